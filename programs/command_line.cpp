@@ -15,68 +15,68 @@ namespace {
 void add_calibration_options(CLI::App& app, CommandLine& line) {
   CalibrateRequest& request = line.request;
   auto* calibrate = app.get_option("--calibrate");
-  auto* latency = app.add_flag("--latency", line.latency, "with --calibrate: how late each camera sees the projector");
+  auto* latency =
+      app.add_flag("--latency", line.latency, "with --calibrate: measure how late each camera sees the projector");
   latency->needs(calibrate);
-  app.add_option("--output", request.output, "with --calibrate: the file that it is kept in")->needs(calibrate);
-  app.add_option("--from", request.from, "a folder of captures, without any hardware")->excludes(latency);
+  app.add_option("--output", request.output, "with --calibrate: the calibration file to write")->needs(calibrate);
+  app.add_option("--from", request.from, "read captures from this folder instead of using hardware")->excludes(latency);
   app.add_option(
          "--board", request.board,
          "charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY (squares), chessboard:COLSxROWS:SQUARE_MM (inner corners), "
          "circles:COLSxROWS:SPACING_MM:DIAMETER_MM, plane:COLSxROWS:PITCH_MM:MARKER_MM:DICTIONARY")
       ->excludes(latency);
   app.add_option("--ruler", request.ruler,
-                 "NOMINAL:MEASURED, in mm: what the ruler on the print says and what it measures")
+                 "NOMINAL:MEASURED, in mm: the length on the print's ruler, and what it measures")
       ->excludes(latency);
   app.add_option("--plane", request.plane,
-                 "with --calibrate: the reference plane of the second step, such as plane:8x5:100:40:DICT_4X4_50")
+                 "with --calibrate: the reference plane for the second step, such as plane:8x5:100:40:DICT_4X4_50")
       ->needs(calibrate)
       ->excludes(latency);
-  app.add_option("--plane-ruler", request.plane_ruler, "as --ruler, of the reference plane's print")->needs("--plane");
-  app.add_option("--planes", request.planes, "with --plane: how many looks at it a session takes")
+  app.add_option("--plane-ruler", request.plane_ruler, "like --ruler, for the print of the reference plane")
+      ->needs("--plane");
+  app.add_option("--planes", request.planes, "with --plane: how many views of the plane to take")
       ->check(between(1, 99))
       ->needs("--plane");
-  app.add_option("--use", request.use, "with --calibrate --from: FIRST:LAST, the poses of that part alone")
+  app.add_option("--use", request.use, "with --calibrate --from: FIRST:LAST, use only these poses")
       ->needs(calibrate)
       ->needs("--from");
-  app.add_flag("--force", request.force,
-               "with --calibrate: replace the calibration in force though distances are of another scale by it")
+  app.add_flag("--force", request.force, "with --calibrate: replace the calibration in force even if the scale differs")
       ->needs(calibrate);
   const auto choose_code = [&request](const std::string& code) { request.gray_code = code == "gray"; };
-  app.add_option_function<std::string>("--code", choose_code,
-                                       "what is projected: the pattern, or a Gray code that takes many pictures a pose")
+  app.add_option_function<std::string>(
+         "--code", choose_code, "what to project: the pattern, or a Gray code, which takes many pictures per pose")
       ->check(one_of({"pattern", "gray"}))
       ->needs(calibrate);
-  app.add_option("--poses", request.poses, "with --calibrate: how many poses a session takes")
+  app.add_option("--poses", request.poses, "with --calibrate: how many poses to take")
       ->check(between(3, 99))
       ->needs(calibrate);
   app.add_option("--record", request.record,
-                 "with --calibrate: the folder that the captures go to; poses in it already are taken over")
+                 "with --calibrate: the folder for the captures; poses already in it are reused")
       ->needs(calibrate);
-  app.add_option("--socket", request.socket,
-                 "with --calibrate: take the poses with the devices of the service that listens there")
+  app.add_option("--socket", request.socket, "with --calibrate: use the devices of the service at this socket")
       ->needs(calibrate)
       ->excludes(latency)
       ->excludes("--from");
-  app.add_flag("--progress", request.progress, "with --calibrate: tell what is seen in JSON, too, a line each")
+  app.add_flag("--progress", request.progress, "with --calibrate: also print progress as JSON, one object per line")
       ->needs(calibrate);
 }
 
 CLI::Option* add_print_options(CLI::App& app, PrintRequest& request) {
-  auto* print = app.add_option("--print-board", request.file, "write a board for calibrating: .pdf, .svg or .png");
-  app.add_option("--paper", request.paper, "the paper to print on; a size is in mm")
+  auto* print = app.add_option("--print-board", request.file, "write a calibration board: .pdf, .svg or .png");
+  app.add_option("--paper", request.paper, "the paper to print on; WIDTHxHEIGHT is in mm")
       ->type_name("{A0,A1,A2,A3,A4,letter} or WIDTHxHEIGHT")
       ->needs(print);
-  app.add_option("--dpi", request.dpi, "of a board that is a PNG")->needs(print);
+  app.add_option("--dpi", request.dpi, "with --print-board FILE.png: its resolution")->needs(print);
   return print;
 }
 
 void add_extrinsics_options(CLI::App& app, ExtrinsicsRequest& request) {
   auto* extrinsics = app.add_option("--extrinsics", request.file,
-                                    "measure where several scanners stand, by a board that they see, and write it");
-  app.add_option("--scanner", request.scanners, "with --extrinsics: NAME=SOCKET; the first is the frame of all")
+                                    "measure with a board where several scanners stand, and write it to this file");
+  app.add_option("--scanner", request.scanners, "with --extrinsics: NAME=SOCKET; the first defines the common frame")
       ->needs(extrinsics);
   app.add_option("--parent", request.parent, "with --extrinsics: the name of that frame (cell)")->needs(extrinsics);
-  app.add_option("--places", request.places, "with --extrinsics: places of the board (3)")
+  app.add_option("--places", request.places, "with --extrinsics: how many places of the board to measure (3)")
       ->check(between(1, 99))
       ->needs(extrinsics);
   for (const char* other : {"--calibrate", "--verify", "--pattern", "--check", "--check-config", "--list"})
@@ -85,22 +85,22 @@ void add_extrinsics_options(CLI::App& app, ExtrinsicsRequest& request) {
 
 void add_options(CLI::App& app, CommandLine& line) {
   app.set_version_flag("--version", "slsd " SLSD_VERSION);
-  app.add_option("--config", line.configuration, "configuration file; without it " + std::string(kConfigurationFile));
-  app.add_option("--log-level", line.level, "least level that is logged")
+  app.add_option("--config", line.configuration, "configuration file; default: " + std::string(kConfigurationFile));
+  app.add_option("--log-level", line.level, "lowest level to log")
       ->check(one_of({"trace", "debug", "info", "warning", "error", "critical"}));
   auto* pattern = app.add_option("--pattern", line.pattern_image, "write the image that the projector shows, as a PNG");
-  auto* check = app.add_flag("--check", line.check, "look at everything that a scan needs, and say what to do");
+  auto* check = app.add_flag("--check", line.check, "check everything that a scan needs, and print remedies");
   auto* check_configuration = app.add_flag("--check-config", line.check_configuration,
-                                           "look at the configuration alone: no device, no service");
-  auto* replay =
-      app.add_option("--replay", line.bundle,
-                     "decode the scans of a bundle of slsctl bundle, and say whether their clouds are the same");
-  app.add_option("--unpack", line.folder, "with --replay: a new folder, for what is in the bundle and the clouds")
+                                           "check only the configuration, without devices or the service");
+  auto* replay = app.add_option("--replay", line.bundle,
+                                "decode the scans of a bundle (slsctl bundle) again, and compare the clouds");
+  app.add_option("--unpack", line.folder, "with --replay: a new folder for the bundle's files and the clouds")
       ->needs(replay);
-  auto* list = app.add_flag("--list", line.list, "list the cameras and projectors that are seen");
-  app.add_flag("--json", line.as_json, "list as JSON")->needs(list);
-  auto* calibrate = app.add_flag("--calibrate", line.calibrate, "measure the scanner itself");
-  auto* verify = app.add_flag("--verify", line.verify, "measure a board or a plane with the calibration in force");
+  auto* list = app.add_flag("--list", line.list, "list the cameras and projectors that slsd finds");
+  app.add_flag("--json", line.as_json, "print the list as JSON")->needs(list);
+  auto* calibrate = app.add_flag("--calibrate", line.calibrate, "calibrate the scanner");
+  auto* verify =
+      app.add_flag("--verify", line.verify, "check the calibration in force by measuring a board or a plane");
   add_calibration_options(app, line);
   calibrate->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
   verify->excludes(pattern)->excludes(check)->excludes(list);
@@ -140,7 +140,7 @@ void check_commands(const CLI::App& app, const CommandLine& line) {
 }  // namespace
 
 tl::expected<CommandLine, int> parse_command_line(int argc, char** argv) {
-  CLI::App app("The service of a single-shot structured-light scanner. Without an option it serves in the foreground.",
+  CLI::App app("The service of a single-shot structured-light scanner. Without options it runs in the foreground.",
                "slsd");
   CommandLine line;
   add_options(app, line);

@@ -63,7 +63,7 @@ MadeService make_service(const std::filesystem::path& file, slsd::Configuration 
     if (made) return made;
     why = made.error();
   }
-  if (why) spdlog::warn("{}: what was set over the socket is passed over: {}", kept_file.string(), to_string(*why));
+  if (why) spdlog::warn("{}: ignoring the settings made over the socket: {}", kept_file.string(), to_string(*why));
   return slsd::Service::create(std::move(configuration), file, nlohmann::json::object());
 }
 

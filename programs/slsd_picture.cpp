@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
   const auto width_px = argc == 3 ? side_of(argv[1]) : std::nullopt;
   const auto height_px = argc == 3 ? side_of(argv[2]) : std::nullopt;
   if (!width_px || !height_px) {
-    constexpr std::string_view kUsage = "slsd-picture: slsd starts this, with a size, for a client's picture\n";
+    constexpr std::string_view kUsage = "slsd-picture: only slsd starts this program, to decode a client's picture\n";
     return ::write(STDERR_FILENO, kUsage.data(), kUsage.size()) > 0 ? 2 : 1;
   }
   write_all(slsd::answer_text(decode(*width_px, *height_px)));

@@ -16,9 +16,10 @@ Result<> start_calibrating(char** argv) {
   ::execv(program.c_str(), argv);
   if (errno != ENOENT && errno != ENOTDIR)
     return fail(ErrorCode::kIo, "does not start: " + std::generic_category().message(errno), program.string());
-  return fail(ErrorCode::kNotFound,
-              "what calibrates, verifies and prints boards is not installed: install the package slsd-calibrate",
-              program.string());
+  return fail(
+      ErrorCode::kNotFound,
+      "the program that calibrates, verifies and prints boards is not installed: install the package slsd-calibrate",
+      program.string());
 }
 
 }  // namespace slsd

@@ -28,9 +28,10 @@ Result<double> print_scale(std::string_view ruler, std::string_view option) {
   const auto nominal = number(ruler.substr(0, colon));
   const auto measured = colon == std::string_view::npos ? std::nullopt : number(ruler.substr(colon + 1));
   if (!nominal || !measured) {
-    return fail(ErrorCode::kInvalidArgument,
-                "is no NOMINAL:MEASURED in mm, such as 200:194.2: what the print's ruler says, and what it measures",
-                fmt::format("{} {}", option, ruler));
+    return fail(
+        ErrorCode::kInvalidArgument,
+        "must be NOMINAL:MEASURED in mm, such as 200:194.2: the length on the print's ruler, and what it measures",
+        fmt::format("{} {}", option, ruler));
   }
   const double scale = *measured / *nominal;
   if (scale < kScaleMin || scale > kScaleMax) {
@@ -50,7 +51,7 @@ Result<Board> as_printed(std::string_view text, std::string_view ruler, std::str
   if (!scale) return tl::unexpected(scale.error());
   if (std::abs(*scale - 1) > kTrueScale) {
     std::cout << fmt::format(
-        "the print is {:.1f} % off its scale, as by a printer's \"fit to page\"; it is taken as it is\n",
+        "the print is {:.1f} % off its scale, as by a printer's \"fit to page\"; slsd uses it as it is\n",
         100 * (*scale - 1));
   }
   return board->scaled(*scale);
@@ -65,7 +66,7 @@ Result<Board> requested_board(const CalibrateRequest& request) {
 Result<std::optional<Board>> requested_plane(const CalibrateRequest& request) {
   if (!request.plane.empty()) return as_printed(request.plane, request.plane_ruler, "--plane-ruler");
   if (request.plane_ruler.empty()) return std::nullopt;
-  return fail(ErrorCode::kInvalidArgument, "is the ruler of a plane that --plane does not name", "--plane-ruler");
+  return fail(ErrorCode::kInvalidArgument, "needs --plane, which names the print", "--plane-ruler");
 }
 
 }  // namespace slsd

@@ -54,10 +54,9 @@ Result<> keep_part(const std::string& use, std::vector<CapturedPose>& poses) {
   const std::string first = use.substr(0, colon), last = colon == use.npos ? first : use.substr(colon + 1);
   for (const std::string& name : {first, last}) {
     if (std::ranges::find(poses, name, &CapturedPose::name) != poses.end()) continue;
-    return fail(
-        ErrorCode::kInvalidArgument,
-        "names no pose that is there: it is FIRST:LAST, such as " + poses.front().name + ":" + poses.back().name,
-        "--use " + use);
+    return fail(ErrorCode::kInvalidArgument,
+                "names no existing pose: write FIRST:LAST, such as " + poses.front().name + ":" + poses.back().name,
+                "--use " + use);
   }
   std::erase_if(poses, [&](const CapturedPose& pose) {
     return pose.subject == PoseSubject::kBoard && (pose.name < first || pose.name > last);
@@ -69,7 +68,7 @@ Result<std::vector<CapturedPose>> list_all(const std::filesystem::path& folder, 
   auto poses = list_captures_with_planes(folder, knows_plane);
   if (!poses || !knows_plane || poses->back().subject == PoseSubject::kPlane) return poses;
   return fail(ErrorCode::kNotFound,
-              "holds no look at the reference plane that --plane names: plane_NN/white.png with pattern.png beside it",
+              "has no view of the reference plane of --plane: plane_NN/white.png with pattern.png beside it",
               folder.string());
 }
 
@@ -108,11 +107,11 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
         captures->refused));
   }
   const Board& found = observers.board.board();
-  if (!(found == *board)) std::cout << fmt::format("the board is {}: it was named rows by columns\n", to_string(found));
+  if (!(found == *board)) std::cout << fmt::format("the board is {}: --board gave rows by columns\n", to_string(found));
   auto outcome = calibrate(std::move(captures->observations), calibrate_options(*configuration, found));
   if (!outcome) return tl::unexpected(refused(*file, outcome.error(), captures->refused));
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
-  std::cout << fmt::format("calibrated in {:.1f} s, {:.2f} s a pose\n", spent.count(),
+  std::cout << fmt::format("calibrated in {:.1f} s, {:.2f} s per pose\n", spent.count(),
                            spent.count() / static_cast<double>(poses->size()));
   return finish_calibration(request, *file, *file, found, captures->refused, std::move(*outcome));
 }

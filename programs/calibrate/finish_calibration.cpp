@@ -26,17 +26,17 @@ path report_of(path file) {
 // Reports an unwritable file before poses are taken, not after.
 Result<path> checked(path file, const std::string& named_by) {
   if (report_of(file) == file) {
-    return fail(
-        ErrorCode::kInvalidArgument,
-        "is where the report goes, which is written beside the calibration as .html: name it otherwise, such as "
-        "calibration.yml",
-        named_by);
+    return fail(ErrorCode::kInvalidArgument,
+                "would be overwritten by the report, which has the same name with .html: choose another name, such as "
+                "calibration.yml",
+                named_by);
   }
   for (const path& written : {file, report_of(file)}) {
     if (auto place = check_writable(written); !place) {
       Error error = place.error();
       error.message +=
-          "; nothing was begun: the calibration and its report are to be written there, or where --output says";
+          "; nothing was started, because the calibration and its report go there: make it writable, or choose another "
+          "place with --output";
       return tl::unexpected(std::move(error));
     }
   }
@@ -58,7 +58,7 @@ path report_of_refused(const path& file) {
 Result<> check_gain(const CalibrateRequest& request, const CalibrationOutcome& outcome, const Board& board,
                     const path& in_force) {
   const std::string nevertheless =
-      request.socket.empty() ? ", or keep it nevertheless by --output " + in_force.string() : std::string();
+      request.socket.empty() ? ", or keep it anyway with --output " + in_force.string() : std::string();
   if (outcome.verdict.grade == Grade::kBad) {
     return fail(ErrorCode::kImpossible,
                 "the calibration is bad and was not put in force; take the poses again as advised" + nevertheless,
@@ -83,10 +83,9 @@ Result<path> file_to_keep(const CalibrateRequest& request, const Configuration& 
   if (!configuration.calibration_file.empty()) {
     return checked(configuration.calibration_file, "[calibration] file " + configuration.calibration_file.string());
   }
-  return fail(
-      ErrorCode::kInvalidArgument,
-      "nowhere to keep the calibration: run slsctl calibrate while the service runs, which keeps it and takes it "
-      "into force; or name a file by --output, or in [calibration] of the configuration");
+  return fail(ErrorCode::kInvalidArgument,
+              "no place to save the calibration: run slsctl calibrate, through which the service saves and uses it; or "
+              "give a file with --output, or as [calibration] file");
 }
 
 CalibrateOptions calibrate_options(const Configuration& configuration, const Board& board) {
@@ -95,7 +94,7 @@ CalibrateOptions calibrate_options(const Configuration& configuration, const Boa
 
 Error refused(const path& file, Error error, const std::vector<PoseReport>& poses) {
   const auto reported = write_report(report_of_refused(file), refusal_html(error.message, poses));
-  if (!reported) std::cout << "no report: " << to_string(reported.error()) << "\n";
+  if (!reported) std::cout << "cannot write the report: " << to_string(reported.error()) << "\n";
   return error;
 }
 

@@ -26,7 +26,7 @@ constexpr double kScalePercent = 0.5, kScaleSigmas = 5;
 std::string difference(const CalibrationOutcome& outcome, const Calibration& before) {
   if (before.projector.width_px != outcome.calibration.projector.width_px ||
       before.projector.height_px != outcome.calibration.projector.height_px) {
-    return "it was of a projector of another size";
+    return "it is for a projector of another size";
   }
   double sum = 0;
   std::size_t count = 0;
@@ -34,7 +34,7 @@ std::string difference(const CalibrationOutcome& outcome, const Calibration& bef
     for (const PoseView& view : pose.views) {
       const CalibratedCamera& camera = outcome.calibration.cameras[view.camera];
       const CalibratedCamera* const other = before.camera(camera.name);
-      if (other == nullptr || other->lens.width_px != camera.lens.width_px) return "it was of another camera";
+      if (other == nullptr || other->lens.width_px != camera.lens.width_px) return "it is for another camera";
       for (const ProjectedPoint& symbol : view.symbols) {
         const Match match{symbol.camera_px, symbol.projector_px};
         const auto now = triangulate(match, camera, outcome.calibration.projector, 1);
@@ -44,7 +44,7 @@ std::string difference(const CalibrationOutcome& outcome, const Calibration& bef
       }
     }
   }
-  return fmt::format("points on the board move by {:.2f} mm (RMS) against it",
+  return fmt::format("points on the board differ from it by {:.2f} mm (RMS)",
                      count == 0 ? 0 : std::sqrt(sum / static_cast<double>(count)));
 }
 
@@ -78,9 +78,9 @@ Result<> check_scale(const RigComparison& comparison, const Board& board, const 
   if (std::abs(percent) < std::max(kScalePercent, kScaleSigmas * comparison.longer_sigma_percent)) return {};
   return fail(
       ErrorCode::kMismatch,
-      fmt::format("{} measures {:.2f} mm where the board is said to have {:.2f} mm, {:.1f} % {}, and nothing else of "
-                  "the rig has changed: hold a rule to the print's ruler, and give what it measures by --ruler. If the "
-                  "new one is right, replace that in force by --force, or keep it elsewhere by --output",
+      fmt::format("{} measures {:.2f} mm where the board should have {:.2f} mm, {:.1f} % {}, and the rig has not "
+                  "changed otherwise: measure the print's ruler, and give the result with --ruler. If the new "
+                  "calibration is right, replace the one in force with --force, or save it elsewhere with --output",
                   dated(before), board.pitch_mm * (1 + percent / 100), board.pitch_mm, std::abs(percent),
                   percent > 0 ? "more" : "less"));
 }
@@ -100,24 +100,22 @@ Result<std::string> compare_with_force(const CalibrationOutcome& outcome, const 
   if (!comparison.change.empty()) {
     const bool other_length =
         std::abs(comparison.longer_percent) > std::max(kScalePercent, kScaleSigmas * comparison.longer_sigma_percent);
-    return fmt::format(
-        "the rig has changed since {}: {}. That one says nothing of the rig as it stands now{}", dated(before),
-        comparison.change,
-        other_length ? fmt::format(". Projector and camera are {:.1f} % {} each other; if they only turned, the print "
-                                   "is not as large as it is said to be: hold a rule to its ruler",
-                                   std::abs(comparison.longer_percent),
-                                   comparison.longer_percent > 0 ? "farther from" : "nearer to")
-                     : "");
+    return fmt::format("the rig has changed since {}: {}. The old calibration no longer applies{}", dated(before),
+                       comparison.change,
+                       other_length ? fmt::format(". Projector and camera are {:.1f} % {} each other; if they only "
+                                                  "turned, the print's size is wrong: measure its ruler",
+                                                  std::abs(comparison.longer_percent),
+                                                  comparison.longer_percent > 0 ? "farther from" : "nearer to")
+                                    : "");
   }
   if (!force) {
     if (auto same = check_scale(comparison, board, before); !same) return tl::unexpected(same.error());
   }
   const auto grade = before.report.verdict ? parse_grade(*before.report.verdict) : std::nullopt;
   if (grade && *grade < outcome.verdict.grade) {
-    return fail(ErrorCode::kImpossible,
-                fmt::format("the calibration is {}, and the one in force is {} and of the same rig: that stays; take "
-                            "more poses, as advised",
-                            to_string(outcome.verdict.grade), to_string(*grade)));
+    return fail(ErrorCode::kImpossible, fmt::format("the calibration is {}, but the one in force is {} and of the same "
+                                                    "rig, so it stays in force; take more poses, as advised",
+                                                    to_string(outcome.verdict.grade), to_string(*grade)));
   }
   return std::string();
 }
@@ -134,8 +132,8 @@ Result<std::string> keep_calibration(const CalibrationOutcome& outcome, const pa
     old += ".old";
     if (auto kept = write_file_atomically(old, *before); !kept) return tl::unexpected(kept.error());
     const auto read = read_calibration(*before, file.string());
-    said += "; the one before is kept in " + old.string() +
-            (read ? ", and " + difference(outcome, *read) : ", which was none that could be read");
+    said += "; the previous one is kept in " + old.string() +
+            (read ? ", and " + difference(outcome, *read) : ", which cannot be read");
   }
   if (auto written = write_file_atomically(file, text); !written) return tl::unexpected(written.error());
   return said;

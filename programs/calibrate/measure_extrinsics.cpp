@@ -54,7 +54,7 @@ Result<Scanner> open_scanner(const std::string& text) {
   const std::size_t equals = text.find('=');
   const std::string name = text.substr(0, equals);
   if (equals == std::string::npos || !is_plain(name) || equals + 1 == text.size()) {
-    return fail(ErrorCode::kInvalidArgument, "is no NAME=SOCKET, such as left=/run/slsd/slsd.sock",
+    return fail(ErrorCode::kInvalidArgument, "must be NAME=SOCKET, such as left=/run/slsd/slsd.sock",
                 "--scanner " + text);
   }
   try {
@@ -63,16 +63,17 @@ Result<Scanner> open_scanner(const std::string& text) {
     const json cameras = settings.value("cameras", json::array());
     const auto calibration = read_calibration(settings.value("calibration", ""), name);
     if (!calibration || cameras.empty()) {
-      return fail(ErrorCode::kNotFound, "this scanner is not calibrated: slsd --calibrate", name);
+      return fail(ErrorCode::kNotFound, "this scanner is not calibrated: run slsd --calibrate", name);
     }
     const std::string camera = cameras[0].value("name", "");
     const CalibratedCamera* calibrated = calibration->camera(camera);
-    if (!calibrated) return fail(ErrorCode::kNotFound, "its first camera is not calibrated: slsd --calibrate", name);
+    if (!calibrated)
+      return fail(ErrorCode::kNotFound, "its first camera is not calibrated: run slsd --calibrate", name);
     return Scanner{name, std::move(service), camera, *calibrated, calibration->report.date.value_or("")};
   } catch (const client::ScannerError& error) {
     return fail(code_of(error), error.what(), name);
   } catch (const json::exception&) {
-    return fail(ErrorCode::kMalformed, "what answers there is no slsd of this version", name);
+    return fail(ErrorCode::kMalformed, "the program that answers is not slsd of this version", name);
   }
 }
 
@@ -104,9 +105,9 @@ Result<CloudLook> look(Scanner& scanner, const Board& board) {
   } catch (const client::ScannerError& error) {
     return fail(code_of(error), error.what(), scanner.name);
   } catch (const json::exception&) {
-    return fail(ErrorCode::kMalformed, "what answers there is no slsd of this version", scanner.name);
+    return fail(ErrorCode::kMalformed, "the program that answers is not slsd of this version", scanner.name);
   }
-  if (!white) return fail(ErrorCode::kMalformed, "the scan came without its white frame", scanner.name);
+  if (!white) return fail(ErrorCode::kMalformed, "the scan lacks its white frame", scanner.name);
   if (const double moved = told.value("white_differs", 0.0); moved > kMovedMax) {
     return fail(ErrorCode::kMismatch, "the board moved during the scan: put it down", scanner.name);
   }
@@ -141,8 +142,8 @@ std::string file_text(const ExtrinsicsRequest& request, const std::vector<Scanne
       text += "calibration_date = " + quoted(scanners[i].calibration_date) + "\n";
     if (i > 0) {
       text += fmt::format(
-          "sigma_mm = {:.4f}      # of a point in the middle of the board's places\n"
-          "sigma_far_mm = {:.4f}  # at the corner of the board that is worst\nplaces = {}\n",
+          "sigma_mm = {:.4f}      # of a point in the middle of the board's places\nsigma_far_mm = {:.4f}  # at the "
+          "board's worst corner\nplaces = {}\n",
           one.sigma_mm, one.sigma_far_mm, one.places);
     }
   }
@@ -175,7 +176,7 @@ Result<> check_scales(const std::vector<std::vector<CloudLook>>& places, const s
     const auto [least, most] = std::ranges::minmax_element(looks, {}, &CloudLook::scale_percent);
     if (looks.size() < 2 || most->scale_percent - least->scale_percent < kScalesDifferMax) continue;
     return fail(ErrorCode::kMismatch,
-                fmt::format("{} measures the board {:.2f} % larger than {} does: calibrate them anew, by one board",
+                fmt::format("{} measures the board {:.2f} % larger than {} does: calibrate both again, with one board",
                             scanners[most->scanner].name, most->scale_percent - least->scale_percent,
                             scanners[least->scanner].name));
   }
@@ -193,9 +194,9 @@ Result<> measure_extrinsics(const ExtrinsicsRequest& request, const CalibrateReq
     auto scanner = open_scanner(text);
     if (!scanner) return tl::unexpected(scanner.error());
     if (!names.insert(scanner->name).second)
-      return fail(ErrorCode::kInvalidArgument, "is named twice", "--scanner " + text);
+      return fail(ErrorCode::kInvalidArgument, "is given twice", "--scanner " + text);
     if (scanner->calibration_date.empty()) {
-      std::cout << scanner->name << ": its calibration has no date: nobody can tell when it is replaced\n";
+      std::cout << scanner->name << ": its calibration has no date, so a later calibration goes unnoticed\n";
     }
     scanners.push_back(std::move(*scanner));
   }
@@ -231,10 +232,10 @@ Result<> measure_extrinsics(const ExtrinsicsRequest& request, const CalibrateReq
     const PlacedScanner& one = placed->scanners[i];
     const Eigen::Vector3d& at = one.first_from_scanner.translation;
     std::cout << fmt::format(
-        "{} stands at ({:.2f}, {:.2f}, {:.2f}) mm in the frame of {}; its points are put to {:.3f} mm, {:.3f} at the "
-        "board's worst corner (one standard deviation)\n",
+        "{} stands at ({:.2f}, {:.2f}, {:.2f}) mm in the frame of {}; its points are exact to {:.3f} mm, to {:.3f} mm "
+        "at the board's worst corner (one standard deviation)\n",
         scanners[i].name, at.x(), at.y(), at.z(), scanners[0].name, one.sigma_mm, one.sigma_far_mm);
-    if (one.places < 2) std::cout << "  by one place of the board alone: nothing checks it; take three\n";
+    if (one.places < 2) std::cout << "  from only one place of the board, so nothing checks it: take three\n";
   }
   auto written = write_file_atomically(request.file, file_text(request, scanners, *board, *placed));
   if (written) std::cout << "written to " << request.file.string() << "\n";

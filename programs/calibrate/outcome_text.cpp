@@ -19,7 +19,7 @@ void add_poses(const CalibrationOutcome& outcome, std::string& text) {
                         pose.held_out.symbol_rms_px);
     if (pose.outlying_corners + pose.outlying_symbols > 0) {
       text +=
-          fmt::format("  {} corners and {} symbols left out as outlying", pose.outlying_corners, pose.outlying_symbols);
+          fmt::format("  {} corners and {} symbols left out as outliers", pose.outlying_corners, pose.outlying_symbols);
     }
     text += "\n";
     for (const std::string& remark : pose.remarks) text += "               " + remark + "\n";
@@ -42,9 +42,9 @@ void add_errors(const CalibrationOutcome& outcome, std::string& text) {
   text += fmt::format("on poses held out: corners {:.3f} px, symbols {:.3f} px; off the epipolar line {:.3f} px\n",
                       outcome.held_out_corner_px, outcome.held_out_symbol_px, outcome.epipolar_rms_px);
   for (const DepthUncertainty& depth : outcome.depth) {
-    text +=
-        fmt::format("depth at {:.0f} mm: uncertain by {:.2f} mm from the calibration, a single symbol by {:.2f} mm\n",
-                    depth.depth_mm, depth.calibration_mm, depth.noise_mm);
+    text += fmt::format(
+        "depth at {:.0f} mm: uncertain by {:.2f} mm from the calibration, by {:.2f} mm for a single symbol\n",
+        depth.depth_mm, depth.calibration_mm, depth.noise_mm);
   }
 }
 
@@ -53,12 +53,12 @@ std::string plane_text(const std::optional<ViewCheck>& check) {
   if (!check) return "not measured";
   const std::string distances =
       check->trueness ? fmt::format(", distances {:+.3f} %", check->trueness->scale_percent) : "";
-  return fmt::format("off it by {:.3f} mm (noise {:.3f}){}", check->plane_rms_mm, check->plane_sigma_mm, distances);
+  return fmt::format("{:.3f} mm off it (noise {:.3f}){}", check->plane_rms_mm, check->plane_sigma_mm, distances);
 }
 
 std::string plane_text(std::string_view when, const VerifySummary& summary) {
-  return fmt::format("  {}: off it by {:.4f} % of the distance; distances {:+.3f} % as a whole, long ones {:.3f} %\n",
-                     when, summary.plane_percent, summary.scale_percent, summary.long_rms_percent);
+  return fmt::format("  {}: {:.4f} % of the distance off it; scale {:+.3f} %, long distances {:.3f} %\n", when,
+                     summary.plane_percent, summary.scale_percent, summary.long_rms_percent);
 }
 
 void add_planes(const CalibrationOutcome& outcome, std::string& text) {

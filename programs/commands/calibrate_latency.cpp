@@ -25,13 +25,12 @@ double milliseconds(std::chrono::microseconds time) {
 }
 
 void print(const CameraLatency& camera) {
-  std::cout
-      << fmt::format(
-             "camera \"{}\": first whole frame {:.1f} ms after the image was shown (5 to 95 % of {} flashes: {:.1f} to "
-             "{:.1f} ms); every frame that began {:.1f} ms after it was whole\n",
-             camera.camera, milliseconds(camera.median), camera.flashes, milliseconds(camera.p05),
-             milliseconds(camera.p95), milliseconds(camera.latency))
-      << std::flush;
+  std::cout << fmt::format(
+                   "camera \"{}\": first complete frame {:.1f} ms after the image was shown (5 to 95 % of {} flashes: "
+                   "{:.1f} to {:.1f} ms); every frame that began {:.1f} ms later was complete\n",
+                   camera.camera, milliseconds(camera.median), camera.flashes, milliseconds(camera.p05),
+                   milliseconds(camera.p95), milliseconds(camera.latency))
+            << std::flush;
 }
 
 Result<LatencyReport> measure(const Configuration& configuration, const LatencyOptions& options) {

@@ -128,7 +128,7 @@ class LiveService {
     if (!answered) return fail(answered.error().code, answered.error().message, socket.string());
     const json& message = answered->reply.message;
     if (message.contains("result") && message["result"].is_object()) return message["result"];
-    return fail(ErrorCode::kMalformed, "what answers there is no slsd", socket.string());
+    return fail(ErrorCode::kMalformed, "the program that answers is not slsd", socket.string());
   }
 
   [[nodiscard]] bool opens_devices() const {
@@ -161,7 +161,7 @@ class Check {
         findings_.warn(warning);
     }
     if (calibration && !calibration_) {
-      findings_.bad("no calibration: name its file as [calibration] file");
+      findings_.bad("no calibration: calibrate, or set [calibration] file");
     } else {
       findings_.note(calibration, "calibration");
     }
@@ -193,20 +193,19 @@ class Check {
       return take_settings(find_kept_settings(file_));
     }
     if (!(*service)->serves(file_)) {
-      return findings_.bad("socket " + socket.string() + ": the service there runs with another configuration, " +
+      return findings_.bad("socket " + socket.string() + ": the service at this socket has another configuration, " +
                            printable((*service)->configuration_file().string()) +
-                           ": check that one, stop the service, or give one of both another [server] socket");
+                           ": check that one, stop the service, or give one of them another [server] socket");
     }
     live_ = std::move(**service);
-    findings_.good("service: it runs, at " + socket.string());
+    findings_.good("service: running at " + socket.string());
     take_settings(live_->set());
     for (const std::string& table : live_->tables_behind(configuration_)) {
       findings_.warn("service: [" + printable(table) +
-                     "] is not yet as in this file: reload the service; what is left then needs a restart");
+                     "] differs from this file: reload the service; tables that still differ then need a restart");
     }
     if (const std::uint64_t dropped = live_->log_lines_dropped(); dropped > 0) {
-      findings_.warn("service: " + std::to_string(dropped) +
-                     " lines of its log were dropped: whoever reads it is too slow");
+      findings_.warn("service: " + std::to_string(dropped) + " lines of its log were dropped: its reader is too slow");
     }
     if (const std::string why = live_->why_empty(); !why.empty())
       findings_.warn("the last scan gave no points: " + why);
@@ -217,20 +216,20 @@ class Check {
     if (settings && settings->empty()) return;
     auto with_them = settings ? load_configuration_with(file_, *settings) : tl::unexpected(settings.error());
     if (!with_them)
-      return findings_.warn("what was set over the socket is passed over: " + to_string(with_them.error()));
+      return findings_.warn("ignoring the settings made over the socket: " + to_string(with_them.error()));
     configuration_ = std::move(*with_them);
-    findings_.good("as set over the socket: " + names_of_settings(*settings));
+    findings_.good("set over the socket: " + names_of_settings(*settings));
   }
 
   /// Notes the service's report about one of its devices. @return whether the device is open
   bool note_held(const std::string& name, const json& device) {
-    const std::string state = device.value("state", "not among its cameras");
+    const std::string state = device.value("state", "not configured");
     const std::string problem = printable(device.value("problem", ""), kLongestProblem);
     if (state == to_string(DeviceState::kReady) || state == to_string(DeviceState::kCapturing)) {
-      findings_.good(name + ": the service holds it, and it is " + state);
+      findings_.good(name + ": in use by the service, " + state);
       return true;
     }
-    findings_.bad(name + ": the service says that it is " + printable(state) + (problem.empty() ? "" : ": " + problem));
+    findings_.bad(name + ": the service reports it as " + printable(state) + (problem.empty() ? "" : ": " + problem));
     return false;
   }
 
@@ -303,7 +302,7 @@ class Check {
                                              {decode.depth_min_mm, decode.depth_max_mm}, read);
     if (!doubt.empty()) return findings_.warn(doubt);
     if (read >= kSymbolsForDoubt)
-      findings_.good(name + ": its calibration fits the symbols of its first frame, " + std::to_string(read));
+      findings_.good(name + ": its calibration fits the symbols of its first frame: " + std::to_string(read));
   }
 
   [[nodiscard]] std::string advice_for(const Error& error, const CameraOptions& absent) const {
@@ -318,11 +317,11 @@ class Check {
     check_hardware_of(name, calibrated_hardware(*calibration_, *known), hardware);
     const std::string size = size_text(width_px, height_px);
     if (known->lens.width_px == width_px && known->lens.height_px == height_px) {
-      return findings_.good(name + " has the size of its calibration, " + size + " px");
+      return findings_.good(name + " matches the size in its calibration, " + size + " px");
     }
-    findings_.bad(name + " gives frames of " + size + " px, its calibration is for " +
+    findings_.bad(name + " sends frames of " + size + " px, but its calibration is for " +
                   size_text(known->lens.width_px, known->lens.height_px) +
-                  " px: set the camera's size, or calibrate it again");
+                  " px: set the camera's size, or calibrate again");
   }
 
   // Simulates a wall as each camera would see it. The time and the memory are those of this machine.
@@ -337,16 +336,15 @@ class Check {
       const DenseOutlook outlook =
           dense_outlook(setup.pattern, *setup.calibration, made.camera_index(), setup.decode, mapper.window_px());
       if (outlook.too_coarse) {
-        findings_.warn(fmt::format(
-            "{}: the pattern is too coarse for this camera, which sees its symbols {:.0f} px apart; the "
-            "surface is fitted "
-            "in windows of {} px: take smaller symbols, such as those of config/patterns/8px-6-dense-no-repeats.toml",
-            name, outlook.pitch_px, mapper.window_px()));
+        findings_.warn(
+            fmt::format("{}: the pattern is too coarse for this camera, which sees symbols {:.0f} px apart and fits "
+                        "windows of {} px: use smaller symbols, such as config/patterns/8px-6-dense-no-repeats.toml",
+                        name, outlook.pitch_px, mapper.window_px()));
       }
       const int stride = DenseMapper::stride_px(camera.lens, setup.decode.dense);
       if (stride != setup.decode.dense.stride_px) {
         findings_.warn(
-            fmt::format("{}: dense_stride_px = {} would take too much memory with so many pixels: {} is used", name,
+            fmt::format("{}: dense_stride_px = {} would need too much memory for this many pixels: slsd uses {}", name,
                         setup.decode.dense.stride_px, stride));
       }
       const Grey8 frame = wall_frame(setup.pattern, *setup.calibration, made.camera_index(), outlook.depth_mm);
@@ -370,17 +368,16 @@ class Check {
       }
       const auto pixels = static_cast<std::size_t>(frame.width()) * static_cast<std::size_t>(frame.height());
       if (points == 0) {
-        findings_.warn(name + " would be empty: of a wall at " + fmt::format("{:.0f}", outlook.depth_mm) +
-                       " mm nothing is decoded; take symbols that the camera sees larger, or look at depth_min_mm and "
-                       "depth_max_mm");
+        findings_.warn(
+            name + " would be empty: a wall at " + fmt::format("{:.0f}", outlook.depth_mm) +
+            " mm shows no symbol that can be decoded; use larger symbols, or check depth_min_mm and depth_max_mm");
         continue;
       }
       constexpr double kMega = 1e6;
       findings_.good(fmt::format(
-          "{}, at {:.0f} mm: parts from {:.1f} mm on, half of waves with a period of {:.1f} mm, {:.2f} mm of depth for "
-          "one px; of a wall {} points of {} pixels in {:.0f} ms a frame, {:.0f} ms without the symbols in a stream of "
-          "what "
-          "stands still; memory {:.0f} MB, {:.0f} MB shared by all that decode, and {:.0f} MB for each cloud under way",
+          "{}, at {:.0f} mm: resolves parts from {:.1f} mm, and half the height of waves {:.1f} mm long; one px is "
+          "{:.2f} mm of depth. A wall gives {} points of {} pixels in {:.0f} ms per frame, in {:.0f} ms in a stream of "
+          "a still scene. Memory: {:.0f} MB, {:.0f} MB shared by all decoders, and {:.0f} MB per cloud in progress",
           name, outlook.depth_mm, outlook.thinnest_part_mm, outlook.half_transfer_mm, outlook.mm_per_px, points, pixels,
           std::chrono::duration<double, std::milli>(least).count(),
           std::chrono::duration<double, std::milli>(still).count(), static_cast<double>(mapper.bytes()) / kMega,
@@ -392,7 +389,7 @@ class Check {
   void check_drift(const std::string& name, const json& drift) {
     if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return;
     findings_.warn(fmt::format(
-        "{}: knocked out of its calibration since scan {}: fasten it and the projector, and calibrate again", name,
+        "{}: knocked out of its calibration since scan {}: fasten it and the projector, then calibrate again", name,
         drift.value("off_since_scan", std::uint64_t{0})));
   }
 
@@ -413,7 +410,7 @@ class Check {
     const auto text = read_file(file, kMaxLatencyBytes);
     if (!text && text.error().code == ErrorCode::kNotFound) {
       if (configuration_.projector.driver == ProjectorDriver::kHeadless) return;
-      return findings_.warn("the latency of projector and cameras was not measured: slsd --calibrate --latency");
+      return findings_.warn("the latency of projector and cameras was not measured: run slsd --calibrate --latency");
     }
     const auto report = text ? read_latency(*text, file) : tl::unexpected(text.error());
     if (!findings_.note(report, "latency " + file.string())) return;
@@ -425,7 +422,7 @@ class Check {
   // Assumes frames of the calibration's size with two bytes per pixel, the maximum.
   void check_black_box() {
     const BlackBoxOptions& options = configuration_.black_box;
-    if (options.memory_max_mb == 0) return findings_.warn("black box: off, so that no failure can be explained later");
+    if (options.memory_max_mb == 0) return findings_.warn("black box: off, so failures cannot be analysed later");
     double scan_bytes = 0;
     for (const CameraOptions& camera : configuration_.cameras) {
       const CalibratedCamera* const known = calibration_ ? calibration_->camera(camera.name()) : nullptr;
@@ -434,8 +431,9 @@ class Check {
     const double scans = scan_bytes > 0 ? static_cast<double>(options.memory_max_bytes()) / scan_bytes : 0;
     const std::string memory = fmt::format("black box: {} MB of memory", options.memory_max_mb);
     if (scan_bytes > 0 && scans < 1) {
-      return findings_.warn(fmt::format("{}, and the frames of a scan may take {:.0f}: raise [black_box] memory_max_mb",
-                                        memory, std::ceil(scan_bytes / (1 << 20))));
+      return findings_.warn(
+          fmt::format("{}, but the frames of one scan may need {:.0f}: raise [black_box] memory_max_mb", memory,
+                      std::ceil(scan_bytes / (1 << 20))));
     }
     findings_.good(scan_bytes > 0 ? fmt::format("{} for the last {:.0f} scans of 8 bits, or {:.0f} of 16", memory,
                                                 std::floor(2 * scans), std::floor(scans))

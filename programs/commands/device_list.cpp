@@ -72,14 +72,13 @@ std::string unseen_text(const CameraOptions& camera) {
   std::ostringstream text;
   text << "configured camera \"" << camera.name() << "\", driver " << camera.driver() << ": ";
   const auto* const file = std::get_if<FileCameraOptions>(&camera.of_driver);
-  text << (file != nullptr ? "replays " + file->path.string() : "is not seen") << "\n";
+  text << (file != nullptr ? "replays " + file->path.string() : "is not found") << "\n";
   return text.str();
 }
 
 /// Describes the projector. Without such a table the default projector applies, which is not visible.
 std::string projector_text(const Configuration& configuration) {
-  if (!configuration.given.contains("projector"))
-    return "no projector is configured: name its monitor in [projector]\n";
+  if (!configuration.given.contains("projector")) return "no projector is configured: set its monitor in [projector]\n";
   const ProjectorOptions& projector = configuration.projector;
   return "configured projector: driver " + std::string(to_string(projector.driver)) + ", " +
          size_text(projector.width_px, projector.height_px) + " px\n";
@@ -150,7 +149,7 @@ std::string CameraList::text() const {
   std::string text;
   for (const ListedCamera& camera : listing_.cameras) text += camera_text(camera, find(camera));
   if (listing_.cameras.empty()) {
-    text += "no camera is seen; looked at:";
+    text += "no camera found; searched:";
     for (const std::string& place : listing_.looked_at) text += kIndent + place;
     text += "\n";
   }
@@ -172,13 +171,13 @@ std::string CameraList::similar_to(const CameraOptions& absent) const {
   std::string similar;
   for (const ListedCamera& camera : listing_.cameras)
     if (camera.driver == absent.driver()) similar += (similar.empty() ? "" : ", ") + printable(camera.name);
-  return similar.empty() ? "no other camera of this driver is seen; slsd --list says where was looked"
-                         : "of this driver are seen: " + similar;
+  return similar.empty() ? "no other camera of this driver is found; slsd --list shows where it searches"
+                         : "found with this driver: " + similar;
 }
 
 std::string MonitorList::text() const {
   if (!outputs_) return "no monitor: " + outputs_.error().message + "\n";
-  if (outputs_->empty()) return "no monitor is plugged in and lit\n";
+  if (outputs_->empty()) return "no monitor is plugged in and on\n";
   std::string text;
   for (const RandrOutput& output : *outputs_) text += "monitor " + describe_output(output) + "\n";
   return text;

@@ -11,7 +11,7 @@ namespace slsd {
 Result<> write_pattern_image(const std::optional<std::filesystem::path>& configuration_file,
                              const std::filesystem::path& image) {
   if (const std::string extension = lower_extension(image); !extension.empty() && extension != ".png")
-    return fail(ErrorCode::kInvalidArgument, "the pattern is written as .png only", image.string());
+    return fail(ErrorCode::kInvalidArgument, "the file of the pattern must end in .png", image.string());
   const auto configuration = load_configuration_or_defaults(configuration_file);
   if (!configuration) return tl::unexpected(configuration.error());
   const auto pattern = configured_pattern(*configuration);

@@ -15,7 +15,7 @@ constexpr double kGreatestDpi = 2400;
 
 Result<std::string> sheet_png(const Sheet& sheet, double dpi) {
   if (!(dpi >= kLeastDpi && dpi <= kGreatestDpi)) {
-    return fail(ErrorCode::kInvalidArgument, "--dpi is 20 to 2400");
+    return fail(ErrorCode::kInvalidArgument, "--dpi must be 20 to 2400");
   }
   return sheet_image(sheet, dpi).and_then([&](const Grey8& image) { return encode_png(image, dpi); });
 }
@@ -25,7 +25,7 @@ Result<std::string> sheet_bytes(const Sheet& sheet, const PrintRequest& request)
   if (extension == ".pdf") return sheet_pdf(sheet);
   if (extension == ".svg") return sheet_svg(sheet);
   if (extension == ".png") return sheet_png(sheet, request.dpi);
-  return fail(ErrorCode::kInvalidArgument, "a board is written as .pdf, .svg or .png", request.file.string());
+  return fail(ErrorCode::kInvalidArgument, "the file of a board must end in .pdf, .svg or .png", request.file.string());
 }
 
 Result<Sheet> sheet_for(const PrintRequest& request) {
@@ -46,7 +46,7 @@ Result<> print_board(const PrintRequest& request) {
   auto written = write_file_atomically(request.file, *bytes);
   if (!written) return written;
   std::cout << "board: " << to_string(sheet->board) << "\npaper: " << sheet->paper.name
-            << "\nprint it at 100 %, not fit to page, and hold a rule to both rulers on it\n";
+            << "\nprint it at 100 %, not \"fit to page\", and measure both rulers on it\n";
   return {};
 }
 

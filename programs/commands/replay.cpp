@@ -35,7 +35,7 @@ Result<> write_below(const path& folder, const std::string& name, std::string_vi
   const path file = folder / name;
   std::error_code error;
   std::filesystem::create_directories(file.parent_path(), error);
-  if (error) return tl::unexpected(system_error(error.value(), "cannot make the folder", file.parent_path()));
+  if (error) return tl::unexpected(system_error(error.value(), "cannot create the folder", file.parent_path()));
   return write_file_atomically(file, bytes);
 }
 
@@ -68,7 +68,7 @@ class Replay {
                                  std::pair(Picture::kBlack, &set.dark)}) {
       if (auto read = read_frames(scan, light_name(light), *frames); !read) return tl::unexpected(read.error());
     }
-    if (set.frames.empty()) return fail(ErrorCode::kMalformed, "a scan has frames of white or dark alone");
+    if (set.frames.empty()) return fail(ErrorCode::kMalformed, "a scan has only white or dark frames");
     // As during the recording: a level from an earlier frame also holds for later ones.
     setup_.full_levels = std::make_unique<FullLevels>();
     for (std::size_t i = 0; i < std::min(scan.full_levels.size(), set.frames.size()); ++i)
@@ -135,7 +135,7 @@ Result<int> replay(const BundledRecording& recording, const path& folder) {
     different += scan.cloud && !same ? 1 : 0;
     std::cout << fmt::format("{}{}: {} points{}, {}\n", name, failed, result->cloud.points.size(),
                              result->dense ? fmt::format(" and {} of pixels", result->dense->points()) : "",
-                             !scan.cloud ? "and no cloud to compare with"
+                             !scan.cloud ? "no cloud to compare with"
                              : same      ? "the same cloud, byte for byte"
                                          : "ANOTHER CLOUD than the bundle's");
     if (folder.empty()) continue;
@@ -160,7 +160,7 @@ Result<> replay_bundle(const path& file, const path& folder) {
             << (bundle->reason.empty() ? "" : ": " + bundle->reason) << "\n";
   std::error_code error;
   if (!folder.empty() && std::filesystem::exists(folder, error)) {
-    return fail(ErrorCode::kAlreadyExists, "is there already: name a new folder", folder.string());
+    return fail(ErrorCode::kAlreadyExists, "already exists: give a new folder", folder.string());
   }
   for (const TarFile& each : bundle->files) {
     if (folder.empty()) break;
@@ -174,8 +174,8 @@ Result<> replay_bundle(const path& file, const path& folder) {
   }
   if (different == 0) return {};
   return fail(ErrorCode::kMismatch,
-              std::to_string(different) + " scan(s) come to something else than in the bundle" +
-                  (bundle->version == SLSD_VERSION ? "" : ", which is of slsd " + bundle->version),
+              std::to_string(different) + " scan(s) have another result than in the bundle" +
+                  (bundle->version == SLSD_VERSION ? "" : ", which slsd wrote in version " + bundle->version),
               file.string());
 }
 

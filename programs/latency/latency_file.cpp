@@ -31,7 +31,7 @@ std::string camera_table(const CameraLatency& camera) {
 int read_count(TableReader& reader, const char* key) {
   int count = 0;
   reader.read(key, count);
-  if (count < 0) reader.refuse(key, "must not be negative: measure again, by slsd --calibrate --latency");
+  if (count < 0) reader.refuse(key, "must not be negative: measure again with slsd --calibrate --latency");
   return count;
 }
 
@@ -79,36 +79,35 @@ std::vector<std::string> latency_warnings(const Configuration& configuration, co
                                           const std::string& projector) {
   std::vector<std::string> warnings;
   if (!projector.empty() && !report.projector.empty() && projector != report.projector)
-    warnings.push_back(
-        fmt::format("the latency was measured with the projector \"{}\", and this one is \"{}\": slsd "
-                    "--calibrate --latency",
-                    report.projector, projector));
+    warnings.push_back(fmt::format(
+        "the latency was measured with the projector \"{}\", but this one is \"{}\": run slsd --calibrate --latency",
+        report.projector, projector));
   for (const CameraOptions& camera : configuration.cameras) {
     const auto measured = std::ranges::find(report.cameras, camera.name(), &CameraLatency::camera);
     if (measured == report.cameras.end()) {
       warnings.push_back(
-          fmt::format("camera \"{}\": its latency was not measured: slsd --calibrate --latency", camera.name()));
+          fmt::format("camera \"{}\": its latency was not measured: run slsd --calibrate --latency", camera.name()));
       continue;
     }
     if (measured->clipped)
-      warnings.push_back(fmt::format(
-          "camera \"{}\": its latency was measured on overexposed frames, and may be too short by an exposure: expose "
-          "less, then slsd --calibrate --latency",
-          camera.name()));
+      warnings.push_back(
+          fmt::format("camera \"{}\": its latency was measured on overexposed frames, and may be one exposure too "
+                      "short: expose less, then run slsd --calibrate --latency",
+                      camera.name()));
     const double needed_ms = std::chrono::duration<double, std::milli>(measured->latency).count();
     if (needed_ms <= configuration.scan.projector_latency_ms) continue;
-    warnings.push_back(fmt::format(
-        "camera \"{}\" saw images whole only {:.1f} ms after they were shown, and [scan] projector_latency_ms is "
-        "{:g}: set {:.0f}",
-        camera.name(), needed_ms, configuration.scan.projector_latency_ms, std::ceil(needed_ms)));
+    warnings.push_back(
+        fmt::format("camera \"{}\" saw complete images only {:.1f} ms after they were shown, but [scan] "
+                    "projector_latency_ms is {:g}: set {:.0f}",
+                    camera.name(), needed_ms, configuration.scan.projector_latency_ms, std::ceil(needed_ms)));
   }
   return warnings;
 }
 
 std::string write_latency(const LatencyReport& report) {
   std::string text =
-      "# From an image that the projector shows to the first frame that has it whole, by\n"
-      "# slsd --calibrate --latency. [scan] projector_latency_ms is to be at least the largest latency_us.\n";
+      "# Time from showing an image to the first complete frame of it, measured by\n# slsd --calibrate --latency. "
+      "[scan] projector_latency_ms must be at least the largest latency_us.\n";
   text += "date = " + quoted(report.date) + "\nprojector = " + quoted(report.projector) + "\n";
   for (const CameraLatency& camera : report.cameras) text += camera_table(camera);
   return text;

@@ -77,13 +77,13 @@ FlashPixels::Samples FlashPixels::sample(const GreyView& frame) {
 
 Result<FlashPixels> FlashPixels::find(const Samples& dark, const Samples& dark_again, const Samples& lit) {
   if (dark.empty() || dark.size() != lit.size() || dark.size() != dark_again.size()) {
-    return fail(ErrorCode::kMismatch, "the camera's frames are not all of the same size: set its size");
+    return fail(ErrorCode::kMismatch, "the camera's frames differ in size: set its size");
   }
   const double flash = brightest_difference(dark, lit);
   const double noise = std::abs(brightest_difference(dark, dark_again));
   if (flash < kAboveNoise * noise + 1) {
     return fail(ErrorCode::kNotFound,
-                "no flash is seen: point the camera at what the projector lights, take the caps off, darken the room, "
+                "the camera saw no flash: point it at what the projector lights, take the caps off, darken the room, "
                 "and allow a longer exposure");
   }
   FlashPixels pixels;
@@ -197,7 +197,7 @@ class LatencyMeter {
       flash.last_incomplete = flash.first_whole;
     }
     return fail(ErrorCode::kTimeout,
-                "a flash was not seen: let nothing move between projector and camera, and measure again");
+                "the camera missed a flash: let nothing move between projector and camera, and measure again");
   }
 
   static CameraLatency summarize(const std::vector<Flash>& flashes) {

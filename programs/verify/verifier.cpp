@@ -18,8 +18,7 @@ namespace {
 Result<Board> board_to_look_for(const CalibrateRequest& request, const Calibration& calibration) {
   if (request.board.empty() && !request.ruler.empty()) {
     return fail(ErrorCode::kInvalidArgument,
-                "name the print whose ruler it is by --board too: the board of the calibration file is already as it "
-                "was measured",
+                "needs --board, which names the print: the board in the calibration file already has its measured size",
                 "--ruler " + request.ruler);
   }
   if (request.board.empty() && calibration.report.board) {
@@ -37,11 +36,12 @@ Result<> check_size(const CapturedPictures& pictures, const CalibratedCamera& ca
   for (const GreyImage& picture : pictures.coded) {
     const ImageSize seen = size_of(picture);
     if (seen == own) continue;
-    return fail(ErrorCode::kMismatch,
-                fmt::format("has pictures of {}x{} px, and its calibration is for {}x{}: set the camera's size, or "
-                            "calibrate again",
-                            seen.width_px, seen.height_px, own.width_px, own.height_px),
-                name);
+    return fail(
+        ErrorCode::kMismatch,
+        fmt::format(
+            "has pictures of {}x{} px, but its calibration is for {}x{}: set the camera's size, or calibrate again",
+            seen.width_px, seen.height_px, own.width_px, own.height_px),
+        name);
   }
   return {};
 }
@@ -53,15 +53,14 @@ Result<Verifier> Verifier::create(const CalibrateRequest& request, const Configu
   auto calibration = configured_calibration(configuration);
   if (!calibration) return tl::unexpected(calibration.error());
   if (!*calibration) {
-    return fail(ErrorCode::kNotFound, "there is no calibration to verify: name its file as [calibration] file");
+    return fail(ErrorCode::kNotFound, "no calibration to verify: calibrate, or set [calibration] file");
   }
   const ImageSize projector = size_of((*calibration)->projector);
   const PatternOptions& shown = pattern.options;
   if (!gray_code && projector != ImageSize{shown.projector_width_px, shown.projector_height_px}) {
     return fail(
         ErrorCode::kMismatch,
-        fmt::format("the pattern is for a projector of {}x{} px, and the calibration for {}x{}: they do not "
-                    "belong together",
+        fmt::format("the pattern is for a projector of {}x{} px, but the calibration for {}x{}: use a matching pair",
                     shown.projector_width_px, shown.projector_height_px, projector.width_px, projector.height_px));
   }
   const auto board = board_to_look_for(request, **calibration);
@@ -82,7 +81,7 @@ Result<PoseView> Verifier::observe_without_board(const PosePictures& pictures, b
   if (!gray_code_) {
     return observe_plane(pictures.coded.at(0), has_white ? std::optional(pictures.white) : std::nullopt, reader);
   }
-  if (!pictures.black) return fail(ErrorCode::kNotFound, "the Gray code needs a picture under the black projector too");
+  if (!pictures.black) return fail(ErrorCode::kNotFound, "a Gray code also needs a picture under the black projector");
   return observe_plane({pictures.white, *pictures.black, pictures.coded}, size_of(calibration_.projector));
 }
 
@@ -109,7 +108,7 @@ Result<> Verifier::look(const std::string& name, const std::string& camera, cons
   if (auto fits = check_size(pictures, *known, name); !fits) return fits;
   std::string remark;
   const auto view = observe(pictures, static_cast<std::size_t>(known - calibration_.cameras.data()), remark);
-  if (!remark.empty()) std::cout << fmt::format("{}: taken as a plain plane: {}\n", name, remark);
+  if (!remark.empty()) std::cout << fmt::format("{}: measured as a plain plane: {}\n", name, remark);
   const auto check = view ? check_view(*view, *known, calibration_.projector) : tl::unexpected(view.error());
   if (!check) {
     std::cout << fmt::format("{}: cannot be measured: {}", name, to_string(check.error())) << std::endl;
@@ -123,16 +122,16 @@ Result<> Verifier::look(const std::string& name, const std::string& camera, cons
 Result<> Verifier::finish() const {
   if (checks_.empty()) {
     return fail(ErrorCode::kNotFound,
-                "nothing could be measured, so that nothing is said of the calibration; if the board is lit and in "
-                "focus, the rig is far from its calibration: calibrate again");
+                "nothing could be measured, so the calibration was not checked; if the board is lit and in focus, the "
+                "rig is far from its calibration: calibrate again");
   }
   const VerifySummary summary = summarise(checks_, limits_);
   std::cout << summary_text(summary, limits_) << std::flush;
   if (!summary.faults.empty()) {
-    return fail(ErrorCode::kMismatch, "the calibration does not hold: " + advice(summary));
+    return fail(ErrorCode::kMismatch, "the calibration no longer fits: " + advice(summary));
   }
   if (board_asked_for_ && summary.views_with_board == 0) {
-    return fail(ErrorCode::kNotFound, "the board was never seen, so that distances were not checked: show it",
+    return fail(ErrorCode::kNotFound, "the board was never in view, so distances were not checked: show it",
                 describe(board_));
   }
   return {};

@@ -73,13 +73,13 @@ class Access(unittest.TestCase):
             for method in ("reload", "project", "set", "calibrate", "bundle"):
                 error = ask(service, STRANGER, method)
                 self.assertEqual(error["data"]["name"], "permission_denied")
-                self.assertIn(f'"{method}" takes the role "administer", and user {STRANGER.pw_uid} has "scan"',
+                self.assertIn(f'"{method}" needs the role "administer", but user {STRANGER.pw_uid} has "scan"',
                               error["message"])
             with service.client() as client:
                 self.assertEqual(client.call("status")[0]["role"], "administer")
                 client.call("reload")
             log = service.log_text()
-            self.assertIn(f"user {STRANGER.pw_uid}) asked for reload, which takes the role \"administer\": refused", log)
+            self.assertIn(f"user {STRANGER.pw_uid}) asked for reload, which needs the role \"administer\": refused", log)
             self.assertIn("reload: by user 0 (process", log)
 
     def test_roles_are_given_by_name(self):
@@ -96,7 +96,7 @@ class Access(unittest.TestCase):
         with self.service('observe = ["daemon"]\nscan = []\nadminister = []') as service:
             error = ask(service, STRANGER, "status")
             self.assertEqual(error["data"]["name"], "permission_denied")
-            self.assertIn("may not use this scanner: be named in [server] observe", error["message"])
+            self.assertIn("may not use this scanner: let an administrator add you to [server] observe", error["message"])
 
     def test_one_user_gets_no_more_places_than_are_left(self):
         with self.service("clients_max = 16") as service:
@@ -141,7 +141,7 @@ class Access(unittest.TestCase):
             with self.assertRaises(RpcError) as refused:
                 client.call("reload")
             self.assertEqual(refused.exception.name, "not_found")
-            self.assertIn('scan names the group "nobody-made-this", which this host does not know',
+            self.assertIn('scan names the group "nobody-made-this", which does not exist on this host',
                           str(refused.exception))
             self.assertEqual(ask(service, STRANGER, "status")["role"], "scan")
 

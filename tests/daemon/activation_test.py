@@ -73,7 +73,7 @@ class Activation(unittest.TestCase):
         with socket.socket(socket.AF_UNIX) as knock:
             knock.connect(str(elsewhere))
             self.assertEqual(process.wait(60), WRONG_CONFIGURATION)
-        self.assertIn(f"systemd listens at {elsewhere} for this service", service.log_text())
+        self.assertIn(f"systemd listens on {elsewhere} for this service", service.log_text())
 
 
 if __name__ == "__main__":

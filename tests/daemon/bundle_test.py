@@ -144,7 +144,7 @@ class Bundle(unittest.TestCase):
             lines = [json.loads(line) for line in files["recording-1/scans.jsonl"].splitlines()]
             self.assertEqual([line["scan"] for line in lines], names[2:])
             self.assertLessEqual(held["held_bytes"], held["limit_bytes"])
-        for memory, what in ((1, "larger than"), (0, None)):
+        for memory, what in ((1, "exceed [black_box] memory_max_mb"), (0, None)):
             with service_on(["16px-5-bust"], black_box=f"memory_max_mb = {memory}") as service:
                 slsctl("--socket", service.socket, "scan")
                 files = self.bundle(service)
@@ -220,18 +220,18 @@ class Bundle(unittest.TestCase):
             self.assertEqual(result.returncode, 1)
             self.assertIn("is cut", result.stderr)
         self.file.write_bytes(whole + b"x" * 512)
-        self.assertIn("behind its end", replay(self.file).stderr)
+        self.assertIn("after its end", replay(self.file).stderr)
         version = files["bundle.json"].replace(b'"version": 1', b'"version": 2')
-        self.refused({"bundle.json": version}, "is of version 2")
-        self.refused({"bundle.json": b"{}"}, "no bundle of slsd")
-        self.refused({"bundle.json": b"[" * 60000}, "no JSON object")
-        self.refused({"bundle.json": b"x" * 100_000}, "longer than")
+        self.refused({"bundle.json": version}, "has version 2")
+        self.refused({"bundle.json": b"{}"}, "not a bundle of slsd")
+        self.refused({"bundle.json": b"[" * 60000}, "not a JSON object")
+        self.refused({"bundle.json": b"x" * 100_000}, "is too long")
         self.refused({"other": b""}, "does not begin with bundle.json")
         for name in ("../escape", "/etc/escape", "recording-1/../../escape", "a//b", "a/", ".bashrc", "a/.ssh", "-rf",
                      "a\nb", "a" * 100):
-            self.refused({"bundle.json": files["bundle.json"], name: b""}, "might lead elsewhere|no regular file|dialect")
+            self.refused({"bundle.json": files["bundle.json"], name: b""}, "might lead outside|not a regular file|another format")
         for kind in (tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.CHRTYPE, tarfile.FIFOTYPE, tarfile.DIRTYPE):
-            self.refused({"bundle.json": files["bundle.json"], "link": b""}, "no regular file",
+            self.refused({"bundle.json": files["bundle.json"], "link": b""}, "not a regular file",
                          link={"type": kind, "linkname": "/etc/passwd"})
         self.refused({"bundle.json": files["bundle.json"], **{f"{i}": b"" for i in range(5000)}}, "more than 4096")
         for missing in ("recording-1/calibration.yml", "recording-1/pattern.toml", "recording-1/scans.jsonl",
@@ -240,13 +240,13 @@ class Bundle(unittest.TestCase):
         # A picture of 4 gigapixels in 70 bytes, and one of another camera.
         bomb = bytes.fromhex("89504e470d0a1a0a0000000d49484452") + b"\0\1\0\0\0\1\0\0\10\0\0\0\0" + bytes(40)
         self.refused({**files, "recording-1/camera/00000000.png": bomb}, "recording-1")
-        self.refused({**files, "recording-1/camera/00000000.png": b"P5 8 8 255\n" + bytes(64)}, "something else")
+        self.refused({**files, "recording-1/camera/00000000.png": b"P5 8 8 255\n" + bytes(64)}, "another result")
         lines = files["recording-1/scans.jsonl"].replace(b'"camera":"camera"', b'"camera":"other"')
         self.refused({**files, "recording-1/scans.jsonl": lines}, "order of the cameras")
         lines = files["recording-1/scans.jsonl"].replace(b"camera/00000000.png", b"../../../etc/passwd")
-        self.refused({**files, "recording-1/scans.jsonl": lines}, "passwd: is missing in the bundle")
+        self.refused({**files, "recording-1/scans.jsonl": lines}, "passwd: is missing from the bundle")
         other = files["recording-1/clouds/00000000.ply"][:-1] + b"\x7f"
-        self.refused({**files, "recording-1/clouds/00000000.ply": other}, "something else than in the bundle")
+        self.refused({**files, "recording-1/clouds/00000000.ply": other}, "another result than in the bundle")
         self.assertEqual(replay(self.folder).returncode, 1)
         self.assertEqual(replay(self.folder / "none").returncode, 1)
         self.assertEqual(os.listdir(self.folder), ["bundle.tar"])

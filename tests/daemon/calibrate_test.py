@@ -106,7 +106,7 @@ class Calibrate(unittest.TestCase):
                 running.send_signal(signal.SIGINT)  # ends it with the poses that are there
                 out, said = running.communicate(timeout=60)
                 self.assertEqual(running.returncode, 1, out)
-                self.assertIn("3 are the least", said)
+                self.assertIn("at least 3 are needed", said)
 
     def test_one_that_is_ended_too_early_cancelled_or_killed_changes_nothing(self):
         with stage(self.state) as service, service.client() as client:
@@ -114,7 +114,7 @@ class Calibrate(unittest.TestCase):
             self.until(client, lambda told: "poses" in told["progress"], "a look")
             client.call("calibrate", action="end")
             told = self.until(client, lambda told: not told["under_way"], "an end")
-            self.assertIn("3 are the least", told["error"])
+            self.assertIn("at least 3 are needed", told["error"])
             client.call("calibrate", action="begin", board=BOARD)
             client.call("calibrate", action="cancel")
             self.assertIn("cancelled", self.until(client, lambda told: not told["under_way"], "an end")["error"])

@@ -62,12 +62,12 @@ class Slsd(unittest.TestCase):
 
     def test_names_what_is_wrong_with_a_configuration(self):
         cases = {"[pattern]\nsymbols = [7]\n": ":2:", '"x\\u001b[31m" = 1\n': "no such table or key: x\\x1b[31m",
-                 "[[camera]]\npath = 'x'\nname = \"\\n\"\n": "no control characters", "[[camera]]\npath = 3\n": ":2:8: [[camera]] path",
+                 "[[camera]]\npath = 'x'\nname = \"\\n\"\n": "without control characters", "[[camera]]\npath = 3\n": ":2:8: [[camera]] path",
                  "[camera]\n": "[[camera]]", "x = \n": ":1:", "[projector]\nbrightness = 2\n": "brightness must be 0 to 1",
                  "[[camera]]\ndriver = 'aravis'\n": "id must be the camera's serial number",
                  "[calibration]\nfile = 'slsd.toml'\n": "slsd.toml:2:",
                  "[calibration]\nfile = '.'\n": "is a folder",
-                 "#" * 10_000_000: "is 10000000 bytes long; at most 1048576 are read"}
+                 "#" * 10_000_000: "is 10000000 bytes long, more than the limit of 1048576 bytes"}
         for text, expected in cases.items():
             with self.subTest(text=text):
                 self.file.write_text(text, encoding="utf-8")
@@ -104,7 +104,7 @@ class Slsd(unittest.TestCase):
         self.assertEqual((result.returncode, result.stderr), (0, ""))
         self.assertIn(f"ok       configuration {service.file}", result.stdout)
         cases = {"[server]\nclients_min = 3\n": "did you mean",
-                 "[server]\nwhistle = 3\n": "is the configuration of another version?",
+                 "[server]\nwhistle = 3\n": "is the configuration for another version?",
                  "[server]\nscan = ['@no-such-group']\n": "no-such-group",
                  "[calibration]\nfile = 'slsd.toml'\n": "slsd.toml:2:"}
         for text, expected in cases.items():
@@ -118,7 +118,7 @@ class Slsd(unittest.TestCase):
         service = Service(camera_path=SCENE / "small.png", camera=COARSE)
         result = slsd("--check", "--config", service.file)
         self.assertEqual(result.returncode, 1)
-        self.assertIn("640x480 px, its calibration is for 1600x1200 px", result.stdout)
+        self.assertIn("640x480 px, but its calibration is for 1600x1200 px", result.stdout)
         service = Service(camera=COARSE)
         result = slsd("--check", "--config", service.file)
         self.assertEqual(result.returncode, 0, result.stdout)
@@ -134,8 +134,8 @@ class Slsd(unittest.TestCase):
 
     def test_check_says_what_dense_clouds_would_give(self):
         said = self.checked_with(lambda text: text)
-        self.assertRegex(said, r'ok +dense clouds of camera "camera", at 1000 mm: parts from \d+\.\d mm on, half of waves '
-                               r'with a period of \d+\.\d mm, .* points of 1920000 pixels in \d+ ms a frame, \d+ ms .* stands still; memory \d+ MB')
+        self.assertRegex(said, r'ok +dense clouds of camera "camera", at 1000 mm: resolves parts from \d+\.\d mm, and half the height '
+                               r'of waves \d+\.\d mm long; .* points of 1920000 pixels in \d+ ms per frame, in \d+ ms .* still scene. Memory: \d+ MB')
         self.assertNotIn("dense_stride_px", said)
         self.assertNotIn("calibrate again", said)
 
@@ -154,7 +154,7 @@ class Slsd(unittest.TestCase):
     def test_check_names_the_stride_that_memory_allows(self):
         larger = lambda text: text.replace("width: 1600", "width: 3200", 1)
         said = self.checked_with(larger, "\n[decode]\ndense_stride_px = 1\n")
-        self.assertIn("dense_stride_px = 1 would take too much memory", said)
+        self.assertIn("dense_stride_px = 1 would need too much memory", said)
 
     def test_warns_of_symbols_that_look_alike(self):
         self.file.write_text("[pattern]\nsymbol_size_px = 8\nsymbols = [1, 7, 22, 25]\n", encoding="utf-8")
@@ -164,14 +164,14 @@ class Slsd(unittest.TestCase):
         service = Service()
         result = slsd("--calibrate", "--latency", "--config", service.file)
         self.assertEqual(result.returncode, 1)
-        self.assertIn("camera camera: no flash is seen", result.stderr)
+        self.assertIn("camera camera: the camera saw no flash", result.stderr)
         self.assertEqual(slsd("--latency", "--config", service.file).returncode, 2)
 
     def test_a_session_ends_at_an_interrupt_and_says_what_it_has(self):
         service = Service()
         with subprocess.Popen([BIN / "slsd", "--calibrate", "--config", service.file], stdout=subprocess.PIPE,
                               stderr=subprocess.PIPE, text=True) as session:
-            self.assertIn("Ctrl-C ends it", session.stdout.readline())
+            self.assertIn("Ctrl-C ends the session", session.stdout.readline())
             session.send_signal(signal.SIGINT)
             _, problem = session.communicate(timeout=120)
         self.assertEqual(session.returncode, 1)
@@ -182,7 +182,7 @@ class Slsd(unittest.TestCase):
         for command in ("--calibrate", "--verify"):
             result = slsd(command, "--from", self.folder, "--config", service.file)
             self.assertEqual(result.returncode, 1, command)
-            self.assertIn("holds no pose", result.stderr)
+            self.assertIn("has no pose", result.stderr)
         for usage in (["--from", self.folder], ["--board", "charuco"], ["--calibrate", "--verify"], ["--poses", "5"],
                       ["--verify", "--ruler", "200:201"],
                       ["--plane", "plane:8x5:100:40:DICT_4X4_50"], ["--calibrate", "--planes", "2"]):
@@ -197,7 +197,7 @@ class Slsd(unittest.TestCase):
         (service.folder / "latency.toml").write_text(latency, encoding="utf-8")
         result = slsd("--check", "--config", service.file)
         self.assertEqual(result.returncode, 0, result.stdout)
-        self.assertIn("warning  camera \"camera\" saw images whole only 51.2 ms", result.stdout)
+        self.assertIn("warning  camera \"camera\" saw complete images only 51.2 ms", result.stdout)
         self.assertIn("set 52", result.stdout)
         (service.folder / "latency.toml").write_text("latency = 1\n", encoding="utf-8")
         self.assertEqual(slsd("--check", "--config", service.file).returncode, 1)
@@ -209,14 +209,14 @@ class Slsd(unittest.TestCase):
             service.wait_ready()
             result = slsd("--check", "--config", service.file)
             self.assertEqual(result.returncode, 0, result.stdout)
-            self.assertIn('ok       camera "camera": the service holds it, and it is ready', result.stdout)
-            self.assertIn("ok       projector: the service holds it, and it is ready", result.stdout)
+            self.assertIn('ok       camera "camera": in use by the service, ready', result.stdout)
+            self.assertIn("ok       projector: in use by the service, ready", result.stdout)
             self.assertNotIn("opens", result.stdout)
             text = service.file.read_text(encoding="utf-8")
             service.file.write_text(text + "clients_max = 7\n", encoding="utf-8")
             result = slsd("--check", "--config", service.file)
             self.assertEqual(result.returncode, 0, result.stdout)
-            self.assertIn("warning  service: [server] is not yet as in this file", result.stdout)
+            self.assertIn("warning  service: [server] differs from this file", result.stdout)
 
     def test_check_asks_the_service_of_a_camera_that_it_has_lost(self):
         folder = self.folder / "frames"
@@ -229,7 +229,7 @@ class Slsd(unittest.TestCase):
                 wait_until(lambda: client.call("status")[0]["cameras"][0]["state"] == "absent", "the loss")
             result = slsd("--check", "--config", service.file)
             self.assertEqual(result.returncode, 1, result.stdout)
-            self.assertRegex(result.stdout, 'error    camera "camera": the service says that it is absent: .*frames')
+            self.assertRegex(result.stdout, 'error    camera "camera": the service reports it as absent: .*frames')
 
     def test_check_names_the_configuration_of_another_service(self):
         with Service(camera=COARSE) as service:
@@ -237,7 +237,7 @@ class Slsd(unittest.TestCase):
             shutil.copy(service.file, other)
             result = slsd("--check", "--config", other)
             self.assertEqual(result.returncode, 1, result.stdout)
-            self.assertIn(f"the service there runs with another configuration, {service.file}", result.stdout)
+            self.assertIn(f"the service at this socket has another configuration, {service.file}", result.stdout)
             self.assertIn('ok       camera "camera" opens', result.stdout)
 
     def test_check_leaves_the_devices_of_a_service_that_hangs_alone(self):
@@ -277,7 +277,7 @@ class Slsd(unittest.TestCase):
         service = Service(configuration='[[camera]]\ndriver = "v4l2"\ndevice = "/dev/no-such-camera"\n')
         result = slsd("--check", "--config", service.file)
         self.assertEqual(result.returncode, 1)
-        self.assertRegex(result.stdout, "(?s)no-such-camera.*No such file.*of this driver (are|is) seen")
+        self.assertRegex(result.stdout, "(?s)no-such-camera.*No such file.*(found with this driver|no other camera of this driver)")
 
 
 COMMANDS = {"scan", "record", "status", "watch", "top", "metrics", "calibrate", "exposure", "project", "frame", "set", "settings",
@@ -292,14 +292,14 @@ class Usage(unittest.TestCase):
         result = program(*arguments)
         self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
         problem, help_is_at = result.stderr.splitlines()
-        self.assertRegex(help_is_at, r'^"sls(ctl|d)[a-z ]* --help" says more$')
+        self.assertRegex(help_is_at, r'^see "sls(ctl|d)[a-z ]* --help"$')
         return problem
 
     def test_lists_its_commands_when_called_alone(self):
         result = slsctl()
         self.assertEqual((result.returncode, result.stdout), (2, ""))
         self.assertEqual(set(re.findall(r"(?m)^  ([a-z]+)  ", result.stderr)), COMMANDS)
-        self.assertTrue(result.stderr.endswith("slsctl: name one of these commands\n"))
+        self.assertTrue(result.stderr.endswith("slsctl: choose one of these commands\n"))
 
     def test_help_has_groups_and_each_command_examples(self):
         text = slsctl("--help").stdout
@@ -331,12 +331,12 @@ class Usage(unittest.TestCase):
                  ("frame", "--camra", "left"): 'slsctl frame: there is no option "--camra"; did you mean --camera?',
                  ("status", "--sokcet", "x"): 'slsctl status: there is no option "--sokcet"; did you mean --socket?',
                  ("-json", "status"): 'slsctl status: there is no option "-json"; did you mean --json?',
-                 ("watch", "--texture"): 'slsctl watch: there is no option "--texture" here: it is one of slsctl scan',
-                 ("scan", "--density", "pixel"): 'slsctl scan: --density: "pixel" is none of symbols, pixels; did you mean pixels?',
-                 ("scan", "--timeout-ms", "0"): 'slsctl scan: --timeout-ms: "0" is no number from 1 to 600000',
+                 ("watch", "--texture"): 'slsctl watch: there is no option "--texture" here: it belongs to slsctl scan',
+                 ("scan", "--density", "pixel"): 'slsctl scan: --density: "pixel" is not one of symbols, pixels; did you mean pixels?',
+                 ("scan", "--timeout-ms", "0"): 'slsctl scan: --timeout-ms: "0" is not a number from 1 to 600000',
                  ("watch", "--count", "1.5"): "slsctl watch: --count takes a whole number",
-                 ("watch", "--count"): "slsctl watch: --count lacks its value",
-                 ("status", "now"): 'slsctl status: it takes no argument "now"',
+                 ("watch", "--count"): "slsctl watch: --count needs a value",
+                 ("status", "now"): 'slsctl status: unexpected argument "now"',
                  ("frame",): "slsctl frame: FILE is missing: the PNG to write; - is standard output"}
         for arguments, problem in cases.items():
             with self.subTest(arguments=arguments):
@@ -350,12 +350,12 @@ class Usage(unittest.TestCase):
                  ("scan", "--picture", "x.tif"): ".png", ("scan", "--cloud-picture", "x.bmp"): ".png",
                  ("bundle", "b.zip"): ".tar", ("scan", "d.tiff", "--normals"): "no normals",
                  ("scan", "d.tif", "--density", "symbols"): "--density pixels", ("scan", "-", "--picture", "-"): "one file only",
-                 ("scan", "d.TIFF", "--cloud-picture", "x.png"): "write the cloud as .ply"}
+                 ("scan", "d.TIFF", "--cloud-picture", "x.png"): "needs a cloud: write it as .ply"}
         for arguments, expected in cases.items():
             with self.subTest(arguments=arguments):
                 self.assertIn(expected, self.refused(*arguments))
         with tempfile.TemporaryDirectory(prefix="slsd-test-") as folder:
-            self.assertIn("as .png only", slsd("--pattern", "p.jpg", cwd=folder).stderr)
+            self.assertIn("must end in .png", slsd("--pattern", "p.jpg", cwd=folder).stderr)
             self.assertEqual(os.listdir(folder), [])
 
 
@@ -543,7 +543,7 @@ class Slsctl(unittest.TestCase):
                 with self.subTest(command=command):
                     result = slsctl("--socket", service.socket, *command)
                     self.assertEqual(result.returncode, 1)
-                    self.assertIn("the service does not answer: look at its log, or restart it", result.stderr)
+                    self.assertIn("the service does not answer: check its log, or restart it", result.stderr)
             service.send_signal(signal.SIGCONT)
 
     def test_a_reader_that_leaves_ends_it(self):

@@ -187,7 +187,7 @@ class LateProjector(unittest.TestCase):
         self.addCleanup(server.close)
         with Service(configuration=configuration, environment={"DISPLAY": server.display}) as service, \
                 service.client() as client:
-            wait_until(lambda: "not there" in client.call("status")[0]["projector"].get("problem", ""), "the reason")
+            wait_until(lambda: "not plugged in" in client.call("status")[0]["projector"].get("problem", ""), "the reason")
             for stroke in ("--off", "--mode 640x360", "--mode 1024x768 --pos 0x0", "--off"):
                 server.plug()  # connected from now on
                 server.xrandr("--dpi", "96", "--output", "DUMMY1", *stroke.split())

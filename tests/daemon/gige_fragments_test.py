@@ -29,7 +29,7 @@ class Fragments(unittest.TestCase):
                     client.call("scan", format="ply", timeout_ms=2000)
         lines = [line for line in self.log_of(camera, try_to_scan).splitlines() if " fragments: " in line]
         self.assertEqual(len(lines), 1, lines)
-        self.assertIn("arrive in pieces", lines[0])
+        self.assertIn("fragments the camera's packets", lines[0])
         self.assertIn(remedy, lines[0])
 
     def test_packets_set_too_large_are_named_with_the_size_that_passes(self):

@@ -61,14 +61,14 @@ class Implausible(unittest.TestCase):
     def test_check_is_content_with_a_sound_one(self):
         told = self.check(None)
         self.assertNotIn("looks like", told)
-        self.assertRegex(told, r"(?m)^ok +camera \"camera\": its calibration fits the symbols of its first frame, \d{3,}")
+        self.assertRegex(told, r"(?m)^ok +camera \"camera\": its calibration fits the symbols of its first frame: \d{3,}")
 
     def test_check_says_once_that_there_is_none(self):
         file = self.folder / "slsd.toml"
         told = configuration(self.folder).replace("file = \"" + str(self.folder), "# \"")
         file.write_text(told, encoding="utf-8")
         lines = [line for line in slsd("--check", "--config", file).stdout.splitlines() if "calibration" in line]
-        self.assertEqual(lines, ["error    no calibration: name its file as [calibration] file"])
+        self.assertEqual(lines, ["error    no calibration: calibrate, or set [calibration] file"])
 
     def test_empty_clouds_say_why_everywhere(self):
         for change in (metres, inverted):

@@ -104,7 +104,7 @@ class Life(unittest.TestCase):
         with Service() as service:
             second = slsd("--config", service.file)
             self.assertEqual(second.returncode, 1)
-            self.assertIn("another daemon answers there", second.stderr)
+            self.assertIn("another daemon already listens here", second.stderr)
             with service.client() as client:
                 self.assertIn("version", client.call("status")[0])
 
@@ -113,7 +113,7 @@ class Life(unittest.TestCase):
         service.socket.write_text("precious", encoding="utf-8")
         result = slsd("--config", service.file)
         self.assertEqual(result.returncode, 78)
-        self.assertIn("no socket", result.stderr)
+        self.assertIn("is not a socket", result.stderr)
         self.assertEqual(service.socket.read_text(encoding="utf-8"), "precious")
 
     def test_path_too_long_is_refused(self):
@@ -127,7 +127,7 @@ class Life(unittest.TestCase):
         service = Service()
         service.file.write_text('[server]\nscan = ["@nobody-made-this"]\n', encoding="utf-8")
         result = slsd("--config", service.file)
-        self.assertIn('the group "nobody-made-this", which this host does not know', result.stderr)
+        self.assertIn('the group "nobody-made-this", which does not exist on this host', result.stderr)
         self.assertEqual(result.returncode, 1)  # the unit tries it again
 
     def test_folder_that_is_missing_is_named(self):
@@ -234,7 +234,7 @@ class Life(unittest.TestCase):
             with service.client() as first:
                 first.call("status")
                 clients = [Client(service.socket) for _ in range(60)]
-                wait_until(lambda: "cannot take another client" in service.log_text(), "the limit")
+                wait_until(lambda: "cannot accept another client" in service.log_text(), "the limit")
                 self.assertIn("version", first.call("status")[0])
                 for client in clients:
                     client.close()
@@ -248,7 +248,7 @@ class Life(unittest.TestCase):
             service.wait_ready()
             first.call_for_descriptor("scan", transport="memfd")[1].close()
             clients = [Client(service.socket) for _ in range(80)]
-            wait_until(lambda: "cannot take another client" in service.log_text(), "the limit")
+            wait_until(lambda: "cannot accept another client" in service.log_text(), "the limit")
             with self.assertRaises(RpcError) as caught:
                 first.call("scan", transport="memfd")
             self.assertEqual(caught.exception.name, "no_space")

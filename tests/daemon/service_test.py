@@ -120,7 +120,7 @@ class Scan(unittest.TestCase):
         wrong = [("scan", {"formatt": "ply"}, "did you mean format?"), ("scan", {"format": "xyz"}, "ply"),
                  ("scan", {"timeout_ms": 0}, "1 to 600000"), ("scan", {"timeout_ms": 1e99}, "1 to 600000"),
                  ("scan", {"timeout_ms": 2**70}, "1 to 600000"), ("scan", {"picture": 1}, "true or false"),
-                 ("subscribe", {"rate_hz": 1e-300}, "0.001 to 1000"), ("frame", {"camera": 7}, "a text"),
+                 ("subscribe", {"rate_hz": 1e-300}, "0.001 to 1000"), ("frame", {"camera": 7}, "a string"),
                  ("status", {"verbose": True}, "no such parameter")]
         with self.service.client() as client:
             for method, params, hint in wrong:

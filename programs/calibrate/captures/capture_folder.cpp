@@ -14,8 +14,8 @@ using std::filesystem::directory_iterator;
 using std::filesystem::path;
 
 constexpr char kLayout[] =
-    "captures lie in DIR/pose_NN/white.png with pattern.png beside it, or with gray_00.png ... and black.png; with "
-    "several cameras in DIR/pose_NN/CAMERA/";
+    "captures are DIR/pose_NN/white.png with pattern.png, or with gray_00.png ... and black.png; with several cameras "
+    "in DIR/pose_NN/CAMERA/";
 
 std::vector<path> sorted_entries(const path& folder, bool folders) {
   std::vector<path> entries;
@@ -62,9 +62,11 @@ CaptureFiles list_files(const path& folder, WhitePicture white) {
     files.lack =
         lacking(std::string("is missing: the board under the white projector; ") + kLayout, folder / "white.png");
   } else if (files.pattern.empty() && files.gray.empty()) {
-    files.lack = lacking(std::string("has nothing projected: neither pattern.png nor gray_00.png; ") + kLayout, folder);
+    files.lack =
+        lacking(std::string("lacks a projected image: neither pattern.png nor gray_00.png; ") + kLayout, folder);
   } else if (files.pattern.empty() && files.black.empty()) {
-    files.lack = lacking("is missing: a Gray code needs the board under the black projector too", folder / "black.png");
+    files.lack =
+        lacking("is missing: a Gray code also needs the board under the black projector", folder / "black.png");
   }
   return files;
 }
@@ -105,11 +107,11 @@ std::string_view folder_prefix(PoseSubject subject) {
 Result<std::vector<CapturedPose>> list_captures(const path& folder, WhitePicture white) {
   std::error_code error;
   if (!std::filesystem::is_directory(folder, error)) {
-    return fail(ErrorCode::kNotFound, std::string("is no folder; ") + kLayout, folder.string());
+    return fail(ErrorCode::kNotFound, std::string("is not a folder; ") + kLayout, folder.string());
   }
   auto poses = list_subject(folder, white, PoseSubject::kBoard);
   if (poses.empty()) {
-    return fail(ErrorCode::kNotFound, std::string("holds no pose; ") + kLayout, folder.string());
+    return fail(ErrorCode::kNotFound, std::string("has no pose; ") + kLayout, folder.string());
   }
   return poses;
 }
@@ -120,7 +122,7 @@ Result<std::vector<CapturedPose>> list_captures_with_planes(const path& folder, 
   auto planes = list_subject(folder, WhitePicture::kNeeded, PoseSubject::kPlane);
   if (!planes.empty() && !knows_plane) {
     return fail(ErrorCode::kInvalidArgument,
-                "is a look at a reference plane: name its print by --plane, or put the folder elsewhere",
+                "is a view of a reference plane: name its print with --plane, or move the folder elsewhere",
                 (folder / planes.front().name).string());
   }
   std::ranges::move(planes, std::back_inserter(*poses));

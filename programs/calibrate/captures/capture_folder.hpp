@@ -29,7 +29,7 @@ struct CapturedPose {
   PoseSubject subject = PoseSubject::kBoard;
 };
 
-/// Whether a pose needs white.png. Without it the board is not visible, but a plane can be measured.
+/// Need for white.png in a pose. Without it the board is not visible, but a plane can be measured.
 enum class WhitePicture { kNeeded, kOptional };
 
 /// Lists the captures in a folder:

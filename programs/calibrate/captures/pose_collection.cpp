@@ -43,8 +43,8 @@ Result<> PoseCollection::set_sizes(const std::vector<GreyImage>& pictures) {
     if (camera.size == ImageSize{}) camera.size = now;
     if (camera.size == now) continue;
     return fail(ErrorCode::kMismatch,
-                fmt::format("takes pictures of {}x{} pixels, and took the poses recorded with {}x{}: set its mode as "
-                            "it was, or begin anew in another folder",
+                fmt::format("takes pictures of {}x{} pixels, but the recorded poses have {}x{}: restore its mode, or "
+                            "start again in another folder",
                             now.width_px, now.height_px, camera.size.width_px, camera.size.height_px),
                 "camera " + camera.name);
   }
@@ -98,7 +98,7 @@ std::string PoseCollection::most_helpful() const {
        {missing_tilt(), missing_place(kCoverageEnough), missing_distance(), missing_place(1)}) {
     if (!missing.empty()) return missing;
   }
-  return "any pose unlike those before";
+  return "any pose unlike the others";
 }
 
 /// The advice to tilt the board to the rarest side; empty if half of the poses are tilted.

@@ -136,10 +136,9 @@ std::string residual_figure(const ImageSize& size, const Points& points, const s
   }
   figure.frame();
   const auto outlying = std::ranges::count_if(points, &DrawnPoint::outlying);
-  return figure.str(
-      fmt::format("{}: {:.3f} px RMS, arrows {:.0f} times as long as they are; {} points lie off "
-                  "(red, their arrows cut short) and took no part",
-                  device, rms, magnified, outlying));
+  return figure.str(fmt::format(
+      "{}: {:.3f} px RMS, arrows enlarged {:.0f} times; {} outliers (red, with shortened arrows) were left out", device,
+      rms, magnified, outlying));
 }
 
 std::string name_of(const CalibrationOutcome& outcome, std::size_t camera) {

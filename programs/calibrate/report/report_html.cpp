@@ -56,7 +56,7 @@ std::string verdict_of(const CalibrationOutcome& outcome, const std::string& ref
   html += fmt::format("<p><span class='grade {0}'>{0}</span></p>\n", grade);
   html += list_of(outcome.verdict.reasons);
   if (!outcome.warnings.empty()) html += "<h2>Warnings</h2>\n" + list_of(outcome.warnings);
-  if (!outcome.verdict.advice.empty()) html += "<h2>What to shoot next</h2>\n" + list_of(outcome.verdict.advice);
+  if (!outcome.verdict.advice.empty()) html += "<h2>Poses to take next</h2>\n" + list_of(outcome.verdict.advice);
   return html;
 }
 
@@ -73,9 +73,9 @@ std::string errors_of(const CalibrationOutcome& outcome) {
                   error_row("symbols, in the cameras", outcome.symbol_rms_px, {}) +
                   error_row("symbols off their epipolar lines, in the projector", outcome.epipolar_rms_px,
                             kEpipolarPx.good) +
-                  error_row("corners of each pose under the calibration by the others", outcome.held_out_corner_px,
+                  error_row("corners of each pose, calibrated from the others", outcome.held_out_corner_px,
                             kHeldOutPx.good) +
-                  error_row("symbols of each pose under the calibration by the others", outcome.held_out_symbol_px,
+                  error_row("symbols of each pose, calibrated from the others", outcome.held_out_symbol_px,
                             kHeldOutPx.good));
 }
 
@@ -92,11 +92,11 @@ std::string plane_cells(const std::optional<ViewCheck>& check) {
 std::string planes_of(const CalibrationOutcome& outcome) {
   if (outcome.planes.empty()) return {};
   std::string html =
-      "<h2>Reference plane</h2>\n<p>Before the second step, when the plane had no part yet, and after it: symbols off "
-      "the plane, mm, and what their noise lets expect; distances between its markers, per cent, as a whole and long "
-      "ones.</p>\n<div class='wide'><table>\n<tr><th>look</th><th colspan='4'>before</th><th "
+      "<h2>Reference plane</h2>\n<p>Before and after the second step, which uses the plane. Off: symbols off the "
+      "plane, in mm; noise: what their noise explains. Distances between markers, in per cent: scale, and long "
+      "distances.</p>\n<div class='wide'><table>\n<tr><th>look</th><th colspan='4'>before</th><th "
       "colspan='4'>after</th></tr>\n<tr><th></th>";
-  for (int i = 0; i < 2; ++i) html += "<th>off</th><th>noise</th><th>as a whole</th><th>long</th>";
+  for (int i = 0; i < 2; ++i) html += "<th>off</th><th>noise</th><th>scale</th><th>long</th>";
   html += "</tr>\n";
   for (const PlaneCheck& plane : outcome.planes) {
     html += fmt::format("<tr><td>{} {}</td>{}{}</tr>\n", escaped(plane.name), escaped(plane.camera),
@@ -113,9 +113,8 @@ std::string image_figures(const CalibrationOutcome& outcome) {
     residuals += camera_residual_figure(outcome, i);
   }
   return "<h2>What the poses cover</h2>\n" + coverage + projector_coverage_figure(outcome) +
-         "<h2>Residuals</h2>\n<p>By how much each point is off. Arrows should point anywhere: if neighbours agree, "
-         "the lens "
-         "is not described.</p>\n" +
+         "<h2>Residuals</h2>\n<p>The error of each point. Arrows should point in random directions: if neighbours "
+         "agree, the lens model does not fit.</p>\n" +
          residuals + projector_residual_figure(outcome);
 }
 
@@ -149,18 +148,17 @@ std::string used_row(const PoseReport& pose, std::size_t index) {
 
 std::string poses_of(const CalibrationOutcome& outcome) {
   std::string html =
-      "<tr><th>pose</th><th>corners</th><th>px</th><th>held out, px</th><th>symbols</th><th>px</th>"
-      "<th>held out, px</th><th>points off</th></tr>\n";
+      "<tr><th>pose</th><th>corners</th><th>px</th><th>held out, px</th><th>symbols</th><th>px</th><th>held out, "
+      "px</th><th>outliers</th></tr>\n";
   std::size_t used = 0;
   for (const PoseReport& pose : outcome.poses) {
     html += pose.fault ? "<tr class='out'><td>" + escaped(pose.name) + "</td>" + words_of("left out: " + pose.reason)
                        : used_row(pose, used++);
   }
   return fmt::format(
-             "<h2>Poses</h2>\n<p>{} were used; {} are good. Errors are root mean square, in the camera; held out: "
-             "under "
-             "the calibration by the other poses. Points off lie far from where all others put them, and took no "
-             "part.</p>\n",
+             "<h2>Poses</h2>\n<p>{} were used; {} are good. Errors are root mean square, in the camera. Held out: "
+             "calibrated from the other poses. Outliers lie far from where all others put them, and were left "
+             "out.</p>\n",
              used, kPosesGood) +
          table_of(html);
 }

@@ -163,10 +163,10 @@ std::string board_figure(const CalibrationOutcome& outcome) {
                      fmt::format("hsl({}, 70%, {:.0f}%)", share < 0 ? 215 : 10, 97 - 45 * std::abs(share)));
   }
   figure.frame();
-  return figure.str(fmt::format(
-      "The board's shape as seen from the front: blue lies {:.2f} mm nearer to the viewer than the middle of all "
-      "heights, red {:.2f} mm farther",
-      half, half));
+  return figure.str(
+      fmt::format("The board's shape from the front: blue is {:.2f} mm nearer to the viewer than the mean height, red "
+                  "{:.2f} mm farther",
+                  half, half));
 }
 
 std::string depth_figure(const CalibrationOutcome& outcome) {
@@ -185,8 +185,7 @@ std::string depth_figure(const CalibrationOutcome& outcome) {
   draw_curve(figure, depths, &DepthUncertainty::calibration_mm, unit, "#06c", kAbovePx);
   figure.frame();
   return figure.str(
-      "one standard deviation of a depth, in mm: blue what the calibration leaves uncertain, grey the noise of one "
-      "symbol");
+      "one standard deviation of a depth, in mm: blue from the calibration, grey from the noise of one symbol");
 }
 
 }  // namespace slsd

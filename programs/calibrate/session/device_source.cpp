@@ -40,7 +40,7 @@ DeviceSource::DeviceSource(std::unique_ptr<Projector> projector, std::vector<std
 Result<std::unique_ptr<DeviceSource>> DeviceSource::create(const Configuration& configuration) {
   if (configuration.cameras.empty()) {
     return fail(ErrorCode::kNotFound,
-                "no camera is configured: add a [[camera]] table, or calibrate from captures by --from");
+                "no camera is configured: add a [[camera]] table, or calibrate from captures with --from");
   }
   auto projector = make_projector(configuration.projector);
   if (!projector) return tl::unexpected(projector.error());

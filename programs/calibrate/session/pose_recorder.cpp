@@ -21,7 +21,7 @@ Result<> failed(const path& where, const std::error_code& error) {
   const ErrorCode code = error == std::errc::no_space_on_device  ? ErrorCode::kNoSpace
                          : error == std::errc::permission_denied ? ErrorCode::kPermissionDenied
                                                                  : ErrorCode::kIo;
-  return fail(code, error.message() + ": record elsewhere by --record", where.string());
+  return fail(code, error.message() + ": choose another folder with --record", where.string());
 }
 
 Result<> make_folder(const path& folder) {
@@ -63,7 +63,7 @@ bool may_be_a_folder(const std::string& name) {
 Result<PoseRecorder> PoseRecorder::create(path folder, std::vector<std::string> cameras, const Pattern& pattern) {
   for (const std::string& name : cameras) {
     if (cameras.size() > 1 && !may_be_a_folder(name)) {
-      return fail(ErrorCode::kInvalidArgument, "cannot be a folder's name, in which its pictures are recorded",
+      return fail(ErrorCode::kInvalidArgument, "cannot be the name of a folder for its pictures: rename the camera",
                   "camera " + name);
     }
   }

@@ -87,8 +87,8 @@ void PoseSession::watch_for_board(const BoardSightings& sightings) {
     tell_at_ = now + options_.timeout;
   } else if (now >= tell_at_) {
     parts_.terminal.say(
-        fmt::format("no {0} has been seen for {1} s: hold it where the projector lights it and a camera sees it, and "
-                    "look whether --{0} names the one you hold{2}",
+        fmt::format("no {0} in view for {1} s: hold it where the projector lights it and a camera sees it, and check "
+                    "that --{0} names the one you hold{2}",
                     parts_.poses.subject() == PoseSubject::kBoard ? "board" : "plane", options_.timeout.count(),
                     unseen_text(sightings, parts_.source.cameras())));
     tell_at_ = now + options_.timeout;
@@ -134,14 +134,14 @@ Result<> PoseSession::keep(PoseTrial trial, BoardSightings sightings) {
   if (!name) return tl::unexpected(name.error());
   handled_ = std::move(sightings);
   sign_centre_px_ = lit_place(trial.views).value_or(sign_centre_px_);
-  std::string text = fmt::format("{}: taken: {}, worked out in {:.2f} s", *name, counts_text(trial.views),
+  std::string text = fmt::format("{}: taken: {}, processed in {:.2f} s", *name, counts_text(trial.views),
                                  std::chrono::duration<double>(trial.work).count());
   for (const std::string& lack : trial.lacks) text += "\n  without " + lack;
   for (const std::string& advice : trial.advice) text += "\n  " + advice;
   parts_.poses.add({*name, std::move(trial.views), parts_.poses.subject()});
   const std::size_t have = parts_.poses.size();
   text += "\n" + coverage_text(parts_.poses.observations());
-  text += have >= options_.poses ? std::string("that is all")
+  text += have >= options_.poses ? std::string("all poses are taken")
                                  : fmt::format("{} more; next: {}", options_.poses - have, parts_.poses.most_helpful());
   parts_.terminal.say(text);
   show(Sign::kTaken);

@@ -18,26 +18,26 @@ constexpr double kFlatDeg = 60;
 
 Result<> judge_light(const BoardSighting& sighting, double usual_blur_px) {
   if (sighting.clipped_share > kClippedShare) {
-    return fail(ErrorCode::kImpossible,
-                fmt::format("clipped: {:.0f} % of the board's pixels are at full level or at 0; expose less, or more "
-                            "where it is dark, or turn a reflection away",
-                            100 * sighting.clipped_share));
+    return fail(ErrorCode::kImpossible, fmt::format("clipped: {:.0f} % of the board's pixels are at full level or at "
+                                                    "0; change the exposure, or turn a reflection away",
+                                                    100 * sighting.clipped_share));
   }
   const double blur = sighting.edge_px;
   const bool unlike = is_blurred(blur, usual_blur_px);
   if (blur > kBlurMaxPx || unlike) {
-    return fail(ErrorCode::kImpossible,
-                fmt::format("blurred: edges of {:.1f} px{}; hold the board where the camera is in focus, and still",
-                            blur, unlike ? fmt::format(", {:.1f} px in the other poses", usual_blur_px) : ""));
+    return fail(
+        ErrorCode::kImpossible,
+        fmt::format("blurred: edges are {:.1f} px wide{}; hold the board still, and where the camera is in focus", blur,
+                    unlike ? fmt::format(", {:.1f} px in the other poses", usual_blur_px) : ""));
   }
   return {};
 }
 
 std::string moved_text(const BoardSightings& before, const BoardSightings& after) {
-  if (!is_seen(after)) return "moved: the board was not seen any more after the pattern; hold it until the tick";
+  if (!is_seen(after)) return "moved: the board was out of view after the pattern; hold it until the tick";
   const double moved = moved_px(before, after);
   if (moved <= kMovedPx) return {};
-  return fmt::format("moved: by {:.1f} px while it was taken; hold it until the tick, or lean it against something",
+  return fmt::format("moved by {:.1f} px during the pose; hold the board until the tick, or lean it against something",
                      moved);
 }
 
@@ -119,7 +119,7 @@ Result<PoseTrial> PoseTaker::take(BoardLook before, const PoseCollection& taken)
     const auto place = place_of(ties_of(*view), observer_.board(), taken.observations().cameras[i].size);
     if (place && place->tilt_deg() > kFlatDeg) {
       trial.advice.push_back(
-          fmt::format("{}the board is seen at a flat angle, tilted by about {:.0f} degrees", who, place->tilt_deg()));
+          fmt::format("{}the board is tilted too far, by about {:.0f} degrees", who, place->tilt_deg()));
     }
     trial.views.push_back(std::move(*view));
   }

@@ -80,7 +80,7 @@ Result<Preparation> prepare(const CalibrateRequest& request) {
 
 std::string resume_text(const path& folder, std::size_t poses) {
   if (poses == 0) return "no pose was taken";
-  return fmt::format("the {} poses taken are kept; go on with them by --record {}", poses, folder.string());
+  return fmt::format("the {} poses taken are kept; continue them with --record {}", poses, folder.string());
 }
 
 void print(const std::string& line) {
@@ -134,8 +134,8 @@ Result<> calibrate_from(const CalibrateRequest& request, const Preparation& prep
   const std::size_t poses = observations.count(PoseSubject::kBoard);
   if (request.progress) print(nlohmann::json{{"state", "computing"}});
   if (poses < static_cast<std::size_t>(kPosesMin)) {
-    return fail(ErrorCode::kCancelled, fmt::format("ended with {} poses, and {} are the least; {}", poses, kPosesMin,
-                                                   resume_text(prepared.folder, poses)));
+    return fail(ErrorCode::kCancelled, fmt::format("ended with {} poses, but at least {} are needed; {}", poses,
+                                                   kPosesMin, resume_text(prepared.folder, poses)));
   }
   const auto begin = std::chrono::steady_clock::now();
   auto outcome = calibrate(observations, calibrate_options(prepared.configuration, prepared.board));
@@ -166,7 +166,7 @@ Result<> calibrate_by_session(const CalibrateRequest& request) {
   PoseSource& source = devices ? static_cast<PoseSource&>(*devices) : *prepared->source;
   const ImageSize projector = source.projector();
   Interrupt::watch();
-  print(fmt::format("board {}{}, projector {}x{}, pictures in {}; Ctrl-C ends it with the poses that are there",
+  print(fmt::format("board {}{}, projector {}x{}, pictures in {}; Ctrl-C ends the session with the poses taken",
                     to_string(prepared->board),
                     prepared->plane ? ", reference plane " + to_string(*prepared->plane) : "", projector.width_px,
                     projector.height_px, prepared->folder.string()));

@@ -39,7 +39,7 @@ Result<Pattern> session_pattern(const path& folder, const Configuration& configu
     return pattern;
   }
   return fail(ErrorCode::kMismatch,
-              "holds the pattern of a projector of another size than the configured one: begin anew in another folder",
+              "holds the pattern of a projector of another size than the configured one: start again in another folder",
               folder.string());
 }
 
@@ -52,8 +52,9 @@ Result<ReadCaptures> read_record(const path& folder, const std::vector<std::stri
     if (!listed) return tl::unexpected(listed.error());
     if (captured_in_gray(*listed) != gray_code) {
       return fail(ErrorCode::kMismatch,
-                  gray_code ? "holds poses of the pattern: go on without --code gray, or begin anew in another folder"
-                            : "holds poses of a Gray code: go on with --code gray, or begin anew in another folder",
+                  gray_code
+                      ? "holds poses of the pattern: continue without --code gray, or start again in another folder"
+                      : "holds poses of a Gray code: continue with --code gray, or start again in another folder",
                   folder.string());
     }
     poses = std::move(*listed);

@@ -28,7 +28,8 @@ Error error_of(const json& told) {
   for (int i = 0; i <= static_cast<int>(ErrorCode::kFrameSkewed); ++i) {
     if (to_string(static_cast<ErrorCode>(i)) == name) code = static_cast<ErrorCode>(i);
   }
-  return {code, told.value("message", "the service refuses it"), told.value("/data/where"_json_pointer, std::string())};
+  return {code, told.value("message", "the service gave no reason"),
+          told.value("/data/where"_json_pointer, std::string())};
 }
 
 }  // namespace

@@ -59,10 +59,10 @@ TEST(ReportHtml, HasEveryDevicePoseAndParameter) {
 TEST(ReportHtml, SaysWhyASessionWasRefused) {
   PoseReport pose;
   pose.name = "pose_<3>", pose.fault = PoseFault::kBlurred, pose.reason = "blurred & dark";
-  const std::string html = refusal_html("the poses are all parallel", {pose});
+  const std::string html = refusal_html("all poses are parallel", {pose});
   expect_balanced(html);
   EXPECT_THAT(html, HasSubstr("not put in force"));
-  EXPECT_THAT(html, HasSubstr("the poses are all parallel"));
+  EXPECT_THAT(html, HasSubstr("all poses are parallel"));
   EXPECT_THAT(html, HasSubstr("pose_&lt;3&gt;"));
   EXPECT_THAT(html, HasSubstr("blurred &amp; dark"));
   EXPECT_THAT(report_html(an_outcome(), "it is bad"), HasSubstr("it is bad"));
@@ -72,7 +72,7 @@ TEST(ReportHtml, ShowsTheBoardsShape) {
   CalibrationOutcome outcome = an_outcome();
   outcome.board.bend_mm = 0.52, outcome.board.bend_sigma_mm = 0.02;
   EXPECT_THAT(report_html(outcome), HasSubstr("bent by 0.52 +- 0.02 mm over its"));
-  EXPECT_THAT(report_html(outcome), HasSubstr("The board's shape as seen from the front"));
+  EXPECT_THAT(report_html(outcome), HasSubstr("The board's shape from the front"));
 }
 
 TEST(ReportHtml, ShowsWhatTheReferencePlaneSays) {
@@ -129,12 +129,12 @@ TEST(ReportHtml, SaysWhyAPoseWasLeftOut) {
 // As the terminal does.
 TEST(ReportHtml, SaysWhatIsToBeRemarkedOfAPoseThatWasUsed) {
   CalibrationOutcome outcome = an_outcome();
-  outcome.poses[2].remarks = {"covered: 147 symbols are not seen in one place"};
+  outcome.poses[2].remarks = {"covered: 147 symbols are missing in one place"};
   outcome.poses[3].without = {"camera left: cut off"};
   outcome.poses[3].outlying_corners = 2, outcome.poses[3].outlying_symbols = 5;
   const std::string html = report_html(outcome);
   expect_balanced(html);
-  EXPECT_THAT(html, HasSubstr("covered: 147 symbols are not seen in one place"));
+  EXPECT_THAT(html, HasSubstr("covered: 147 symbols are missing in one place"));
   EXPECT_THAT(html, HasSubstr("without camera left: cut off"));
   EXPECT_THAT(html, HasSubstr("<td>7</td></tr>"));
 }

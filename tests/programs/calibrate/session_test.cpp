@@ -97,7 +97,7 @@ TEST_F(CalibrationSession, TakesPosesByItself) {
   }
   EXPECT_EQ(stage_->coded(), 3);
   EXPECT_THAT(out_.str(), HasSubstr("pose_02: taken"));
-  EXPECT_THAT(out_.str(), HasSubstr("that is all"));
+  EXPECT_THAT(out_.str(), HasSubstr("all poses are taken"));
   EXPECT_THAT(out_.str(), Not(HasSubstr("not taken")));
 }
 
@@ -157,7 +157,7 @@ TEST_F(CalibrationSession, RefusesPlanesOfWhichNothingIsKnown) {
   const auto listed = list_captures_with_planes(folder_.path(), false);
   ASSERT_FALSE(listed);
   EXPECT_THAT(to_string(listed.error()),
-              HasSubstr("plane_00: is a look at a reference plane: name its print by --plane"));
+              HasSubstr("plane_00: is a view of a reference plane: name its print with --plane"));
   EXPECT_EQ(list_captures_with_planes(folder_.path(), true)->size(), 2u);
   EXPECT_EQ(list_captures(folder_.path())->size(), 1u);
 }
@@ -226,7 +226,7 @@ TEST_F(CalibrationSession, RefusesABoardOfWhichTooLittleIsSeen) {
   board_ = *parse_board("charuco:4x3:50:37.5:DICT_5X5_1000");
   begin();
   ASSERT_TRUE(run(1, [&] { return says("not taken"); }));
-  EXPECT_THAT(out_.str(), HasSubstr("not taken: only 6 of the board's corners were found, 8 are the least"));
+  EXPECT_THAT(out_.str(), HasSubstr("not taken: only 6 of the board's corners were found, but 8 are needed"));
   EXPECT_EQ(poses_->size(), 0u);
 }
 
@@ -235,7 +235,7 @@ TEST_F(CalibrationSession, SaysWhatToDoWhereNoBoardIsSeen) {
   stage_->operate = [](const auto&) { return std::nullopt; };
   stage_->frame = 20s;
   ASSERT_TRUE(run(1, [&] { return stage_->passed() > 75s; }));
-  EXPECT_THAT(out_.str(), HasSubstr("no board has been seen for 60 s"));
+  EXPECT_THAT(out_.str(), HasSubstr("no board in view for 60 s"));
   EXPECT_THAT(out_.str(), HasSubstr("camera left: "));
 }
 

@@ -43,7 +43,7 @@ TEST(CameraList, TellsWhatIsSeenAndWhatIsConfigured) {
   const CameraList list(configuration, {{gige_camera()}, {}});
   EXPECT_THAT(list.text(), HasSubstr("camera Maker-S77\n    GigE Vision, serial S77\n    at 10.0.0.7 through eth1 "
                                      "(10.0.0.1/24), link of 1000 Mbit/s\n    formats: Mono8 1600x1200\n    configured "
-                                     "as \"left\"\nconfigured camera \"left\", driver aravis: is not seen\n"));
+                                     "as \"left\"\nconfigured camera \"left\", driver aravis: is not found\n"));
   const nlohmann::json json = list.json();
   EXPECT_EQ(json["cameras"][0]["configured_as"], "left");
   EXPECT_EQ(json["cameras"][0]["formats"][0]["sizes"][0]["height_px"], 1200);
@@ -54,7 +54,7 @@ TEST(CameraList, TellsWhatIsSeenAndWhatIsConfigured) {
 TEST(CameraList, SaysWhatWasLookedAtWhereThereIsNone) {
   const Configuration configuration;
   const CameraList list(configuration, {{}, {"V4L2: /dev/video*"}});
-  EXPECT_THAT(list.text(), HasSubstr("no camera is seen; looked at:\n    V4L2: /dev/video*\n"));
+  EXPECT_THAT(list.text(), HasSubstr("no camera found; searched:\n    V4L2: /dev/video*\n"));
 }
 
 TEST(CameraList, OffersCamerasOfTheSameDriver) {

@@ -95,7 +95,7 @@ TEST(MeasureLatency, RefusesWhereNoFlashIsSeen) {
   const auto latency = measure(room);
   ASSERT_FALSE(latency);
   EXPECT_EQ(latency.error().code, ErrorCode::kNotFound);
-  EXPECT_THAT(latency.error().message, HasSubstr("no flash is seen"));
+  EXPECT_THAT(latency.error().message, HasSubstr("the camera saw no flash"));
 }
 
 TEST(MeasureLatency, RefusesWhereTheLightComesTooLate) {

@@ -85,7 +85,7 @@ TEST_F(VerifyFromFiles, TakesTheRulerOfABoardThatIsNamed) {
   const auto alone = verify();
   ASSERT_FALSE(alone);
   EXPECT_EQ(alone.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_THAT(to_string(alone.error()), HasSubstr("--ruler 200:200: name the print whose ruler it is by --board too"));
+  EXPECT_THAT(to_string(alone.error()), HasSubstr("--ruler 200:200: needs --board, which names the print"));
   request_.board = kSimulatedBoard;
   const auto done = verify();
   EXPECT_TRUE(done) << to_string(done.error());
