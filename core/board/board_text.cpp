@@ -77,20 +77,20 @@ std::string family_names() {
 }
 
 auto refuse(std::string_view text, const std::string& why) {
-  return fail(ErrorCode::kInvalidArgument, "the board \"" + std::string(text) + "\" cannot be: " + why);
+  return fail(ErrorCode::kInvalidArgument, "the board \"" + std::string(text) + "\" is not possible: " + why);
 }
 
 Result<Board> check_marks(std::string_view text, const Board& board) {
   if (board.kind == BoardKind::kChessboard) return board;
-  if (!(board.mark_mm > 0)) return refuse(text, "markers and discs are larger than 0 mm");
+  if (!(board.mark_mm > 0)) return refuse(text, "markers and discs must be larger than 0 mm");
   if (board.kind == BoardKind::kCircles && board.mark_mm >= std::sqrt(2) * board.pitch_mm) {
-    return refuse(text, "discs as wide as 1.41 times the spacing touch each other");
+    return refuse(text, "discs must be smaller than 1.41 times the spacing, or they touch");
   }
   if (board.kind != BoardKind::kCircles && board.mark_mm >= board.pitch_mm) {
     return refuse(text, "a marker must be smaller than its square");
   }
   if (board.family && board.marker_count() > board.family->count) {
-    return refuse(text, "it needs " + std::to_string(board.marker_count()) + " markers and " +
+    return refuse(text, "it needs " + std::to_string(board.marker_count()) + " markers, but " +
                             std::string(board.family->name) + " has " + std::to_string(board.family->count));
   }
   return board;
@@ -99,10 +99,10 @@ Result<Board> check_marks(std::string_view text, const Board& board) {
 Result<Board> check(std::string_view text, const Board& board) {
   const int least = board.kind == BoardKind::kPlane ? 2 : 3;
   if (board.columns < least || board.rows < least || board.columns > kMaxCount || board.rows > kMaxCount) {
-    return refuse(text, "columns and rows are " + std::to_string(least) + " to " + std::to_string(kMaxCount));
+    return refuse(text, "columns and rows must be " + std::to_string(least) + " to " + std::to_string(kMaxCount));
   }
   if (!(board.pitch_mm > 0 && board.pitch_mm <= kMaxLengthMm)) {
-    return refuse(text, "lengths are more than 0 and at most 10000 mm");
+    return refuse(text, "lengths must be more than 0 and at most 10000 mm");
   }
   return check_marks(text, board);
 }
@@ -123,17 +123,17 @@ Result<Board> parse_board(std::string_view text) {
                       read_length(fields[2], board.pitch_mm) &&
                       (form.fields < 4 || read_length(fields[3], board.mark_mm));
     if (!read) {
-      return fail(ErrorCode::kMalformed, "the board \"" + std::string(text) + "\" is not of the form " +
+      return fail(ErrorCode::kMalformed, "the board \"" + std::string(text) + "\" does not have the form " +
                                              std::string(form.form) + ", with lengths such as 25.4");
     }
     if (form.fields == 5 && !(board.family = find_marker_family(fields[4]))) {
       return fail(ErrorCode::kMalformed,
-                  "no dictionary of markers is called \"" + std::string(fields[4]) + "\"; there are " + family_names());
+                  "unknown marker dictionary \"" + std::string(fields[4]) + "\"; known are " + family_names());
     }
     return check(text, board);
   }
   return fail(ErrorCode::kMalformed,
-              "the board \"" + std::string(text) + "\" is of no known form; these are " + forms());
+              "the board \"" + std::string(text) + "\" has an unknown form; known are " + forms());
 }
 
 std::string to_string(const Board& board) {

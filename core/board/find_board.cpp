@@ -45,14 +45,14 @@ Result<BoardSighting> find(const BoardPhoto& photo, const Board& board) {
 
 Result<BoardSighting> find_board(const GreyView& image, const Board& board) {
   const bool too_small = std::visit([](const auto& v) { return std::min(v.width, v.height) < kLeastSidePx; }, image);
-  if (too_small) return fail(ErrorCode::kInvalidArgument, "an image of less than 16 x 16 px shows no board");
+  if (too_small) return fail(ErrorCode::kInvalidArgument, "an image smaller than 16 x 16 px cannot show a board");
   const BoardPhoto photo = photograph(image);
   auto found = find(photo, board);
   if (const double share = found ? 0 : full_share(photo); share > kClippedShare) {
     return fail(found.error().code,
                 "clipped: " + std::to_string(std::lround(100 * share)) +
-                    " % of the picture's pixels are at full level, and the board is not found in the rest (" +
-                    found.error().message + "); expose less, or turn what shines away");
+                    " % of the picture's pixels are at full level, and the rest does not show the board (" +
+                    found.error().message + "); expose less, or turn shiny parts away");
   }
   return found;
 }

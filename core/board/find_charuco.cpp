@@ -48,10 +48,10 @@ Result<BoardSighting> find_charuco(const BoardPhoto& photo, const Board& board) 
   lattice.grow();
   auto corners = lattice.corners();
   if (!span_a_plane(corners, board, kLeastCorners)) {
-    return fail(ErrorCode::kNotFound, "too little of the board is seen: " + std::to_string(corners.size()) +
+    return fail(ErrorCode::kNotFound, "too little of the board is visible: " + std::to_string(corners.size()) +
                                           " corners of " + std::to_string(board.point_count()) + ", " +
                                           std::to_string(markers->size()) +
-                                          " markers; show more of it, sharper or with more light");
+                                          " markers; show more of it, focus, or add light");
   }
   return summarise(std::move(corners), photo, board);
 }

@@ -108,17 +108,18 @@ tl::unexpected<Error> refuse(const Grey8& image, const Board& board) {
   const Part part = largest_part(image);
   const std::string name = describe(board);
   if (part.columns == 0) {
-    return fail(ErrorCode::kNotFound, name + " is not seen; light it, focus, and hold it so that all of it is in view");
+    return fail(ErrorCode::kNotFound, name + " is not visible; light it, focus, and hold all of it in view");
   }
   const std::string size = std::to_string(part.columns) + "x" + std::to_string(part.rows) + " inner corners";
   const bool larger = std::max(part.columns, part.rows) > std::max(board.columns, board.rows) ||
                       std::min(part.columns, part.rows) > std::min(board.columns, board.rows);
-  if (larger) return fail(ErrorCode::kMismatch, "another board is seen: it has " + size + ", and not those of " + name);
+  if (larger) return fail(ErrorCode::kMismatch, "the picture shows another board: it has " + size + ", unlike " + name);
   if (part.at_edge) {
     return fail(ErrorCode::kNotFound, name + " is cut off by the image's edge: " + size +
-                                          " are seen; a chessboard must be in view wholly, its white border with it");
+                                          " are visible; show the whole chessboard with its white border");
   }
-  return fail(ErrorCode::kNotFound, name + " is hidden in part, unevenly lit, or another one: " + size + " are seen");
+  return fail(ErrorCode::kNotFound,
+              name + " is partly hidden, unevenly lit, or another board: " + size + " are visible");
 }
 
 // Empty if, in this order, the top left square would have the other colour.
@@ -138,9 +139,10 @@ Result<BoardSighting> find_chessboard(const BoardPhoto& photo, const Board& boar
   const bool crowded = is_crowded(photo.grey, board);
   const auto found = search(photo.grey, board, crowded);
   if (found.empty() && crowded) {
-    return fail(ErrorCode::kMismatch,
-                describe(board) + " is not seen, and something finely divided is, such as the projected pattern; the " +
-                    "board is looked for in white light: see that its picture and the pattern's are not exchanged");
+    return fail(ErrorCode::kMismatch, describe(board) +
+                                          " is not visible, but a fine texture is, such as the projected pattern; "
+                                          "check that the white picture and the "
+                                          "pattern's are not swapped");
   }
   if (found.size() != static_cast<std::size_t>(board.point_count())) return refuse(photo.grey, board);
   std::vector<MeasuredPoint> most;
@@ -157,7 +159,7 @@ Result<BoardSighting> find_chessboard(const BoardPhoto& photo, const Board& boar
   if (100 * most.size() < kLeastPerCent * found.size()) {
     return fail(ErrorCode::kNotFound, "only " + std::to_string(most.size()) + " of " + std::to_string(found.size()) +
                                           " corners of " + describe(board) +
-                                          " are sharp enough; hold it still, focus, and give it more light");
+                                          " are sharp enough; hold it still, focus, and add light");
   }
   auto sighting = summarise(std::move(most), photo, board);
   sighting.half_turn_ambiguous = (board.columns + board.rows) % 2 == 0;

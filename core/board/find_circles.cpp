@@ -79,11 +79,10 @@ std::vector<GridOrder> fitting_orders(const std::vector<Eigen::Vector2d>& centre
 tl::unexpected<Error> refuse(const Grey8& grey, const Board& board, bool seen) {
   if (!fitting_orders(search(mirrored(grey), board), board).empty()) {
     return fail(ErrorCode::kMismatch,
-                describe(board) + " is seen mirrored; turn the camera's mirroring off, or a mirror away");
+                describe(board) + " appears mirrored; turn off the camera's mirroring, or remove the mirror");
   }
-  if (seen) return fail(ErrorCode::kMismatch, "discs are seen, but not where " + describe(board) + " has them");
-  return fail(ErrorCode::kNotFound,
-              describe(board) + " is not seen; light it, focus, and hold it so that all of it is in view");
+  if (seen) return fail(ErrorCode::kMismatch, "discs are visible, but not where " + describe(board) + " has them");
+  return fail(ErrorCode::kNotFound, describe(board) + " is not visible; light it, focus, and hold all of it in view");
 }
 
 std::vector<MeasuredPoint> measure(const BoardPhoto& photo, const Board& board, const GridOrder& order) {
@@ -117,7 +116,7 @@ Result<BoardSighting> find_circles(const BoardPhoto& photo, const Board& board) 
   auto discs = measure(photo, board, improved(orders.front(), once));
   if (!span_a_plane(discs, board, static_cast<std::size_t>(kLeastShare * board.point_count()))) {
     return fail(ErrorCode::kNotFound,
-                "too few discs of " + describe(board) + " are seen clearly; give it more light, and hold it still");
+                "too few discs of " + describe(board) + " are clearly visible; add light, and hold it still");
   }
   auto sighting = summarise(std::move(discs), photo, board);
   sighting.half_turn_ambiguous = orders.size() > 1;

@@ -34,8 +34,7 @@ Result<BoardSighting> find_plane(const BoardPhoto& photo, const Board& board) {
   }
   if (points.empty()) {
     return fail(ErrorCode::kNotFound,
-                "the markers of " + describe(board) +
-                    " are too blurred or too small to be measured; focus, and give it more light");
+                "the markers of " + describe(board) + " are too blurred or too small to measure; focus, and add light");
   }
   return summarise(std::move(points), photo, board);
 }

@@ -38,20 +38,20 @@ std::vector<SeenMarker> agreeing(std::span<const SeenMarker> markers, const Boar
 
 auto refuse_legacy() {
   return fail(ErrorCode::kMismatch,
-              "a board of OpenCV's legacy pattern is seen, its top left square white, as OpenCV before 4.6 drew it; "
-              "print one by slsd --print-board, or with an odd number of rows, where both are the same");
+              "the board has OpenCV's legacy pattern, with a white top left square, as drawn before OpenCV 4.6; print "
+              "one with slsd --print-board, or one with an odd number of rows");
 }
 
 auto refuse_layout(const Board& board) {
-  return fail(ErrorCode::kMismatch, "another board is seen: its markers are of " + std::string(board.family->name) +
-                                        " and not where " + describe(board) +
+  return fail(ErrorCode::kMismatch, "the picture shows another board: its markers are of " +
+                                        std::string(board.family->name) + ", but not where " + describe(board) +
                                         " has them; give the board that was printed");
 }
 
 auto refuse_strangers(int stranger, const Board& board) {
-  return fail(ErrorCode::kMismatch, "another board is seen: it has the marker " + std::to_string(stranger) + " of " +
-                                        std::string(board.family->name) + ", and " + describe(board) +
-                                        " only those below " + std::to_string(board.marker_count()) +
+  return fail(ErrorCode::kMismatch, "the picture shows another board: it has the marker " + std::to_string(stranger) +
+                                        " of " + std::string(board.family->name) + ", but " + describe(board) +
+                                        " has only those below " + std::to_string(board.marker_count()) +
                                         "; give the board that was printed");
 }
 

@@ -21,15 +21,16 @@ bool is_mirrored(const BoardPhoto& photo, const Board& board) {
 
 tl::unexpected<Error> refuse(const BoardPhoto& photo, const Board& board, const SeenMarkers& seen) {
   if (!seen.unknown.empty() && is_mirrored(photo, board)) {
-    return fail(ErrorCode::kMismatch, "the board is seen mirrored; turn the camera's mirroring off, or a mirror away");
+    return fail(ErrorCode::kMismatch,
+                "the board appears mirrored; turn off the camera's mirroring, or remove the mirror");
   }
   if (const auto* other = find_other_family(photo.grey, seen.unknown, *board.family)) {
-    return fail(ErrorCode::kMismatch, "another board is seen: its markers are of " + std::string(other->name) +
-                                          " and those of " + describe(board) +
+    return fail(ErrorCode::kMismatch, "the picture shows another board: its markers are of " +
+                                          std::string(other->name) + ", but those of " + describe(board) +
                                           " are not; give the board that was printed");
   }
   return fail(ErrorCode::kNotFound,
-              "no marker of " + describe(board) + " is seen; light it, focus, and hold it so that the camera sees it");
+              "no marker of " + describe(board) + " is visible; light it, focus, and hold it in view");
 }
 
 }  // namespace

@@ -23,9 +23,9 @@ constexpr std::size_t kPosesMin = 3;
 Result<> check_count(const Observations& observations, const PoseList& poses) {
   if (observations.poses.size() >= kPosesMin) return {};
   const std::string faults = poses.faults();
-  return fail(ErrorCode::kImpossible, std::to_string(observations.poses.size()) + " of the poses can be used, and " +
-                                          std::to_string(kPosesMin) +
-                                          " are the least; 10 to 15 make a good calibration" +
+  return fail(ErrorCode::kImpossible, std::to_string(observations.poses.size()) +
+                                          " of the poses can be used, but at least " + std::to_string(kPosesMin) +
+                                          " are needed; 10 to 15 make a good calibration" +
                                           (faults.empty() ? "" : ". Left out: " + faults));
 }
 
@@ -37,19 +37,17 @@ Result<> check_one_rig(const Adjustment& adjustment, const Observations& observa
   std::string parts;
   const auto add = [&](std::size_t count, std::size_t first, std::string_view when) {
     if (count < kPosesMin) return;
-    parts += fmt::format("{} --use {}:{} is the rig as it {}", parts.empty() ? "" : ",", poses[first].name,
+    parts += fmt::format("{} --use {}:{} has the rig as it {}", parts.empty() ? "" : ",", poses[first].name,
                          poses[first + count - 1].name, when);
   };
-  add(after, before, "stands now");
+  add(after, before, "is now");
   add(before, 0, "was before");
-  const std::string now = after < kPosesMin ? fmt::format(
-                                                  "; of the rig as it stands now there are {} poses, and {} "
-                                                  "are the least",
-                                                  after, kPosesMin)
-                                            : std::string();
+  const std::string now =
+      after < kPosesMin ? fmt::format("; only {} poses show the rig as it is now, but {} are needed", after, kPosesMin)
+                        : std::string();
   return fail(ErrorCode::kImpossible,
-              fmt::format("the session is not one rig: {}. Fasten the devices and take the poses again{}{}",
-                          change->text, parts.empty() ? "" : ", or calibrate by those of one part:" + parts, now));
+              fmt::format("the rig moved during the session: {}. Fasten the devices and take the poses again{}{}",
+                          change->text, parts.empty() ? "" : ", or calibrate with one part of them:" + parts, now));
 }
 
 /// Removes poses and points that contradict the rest, one after the other.
@@ -102,7 +100,7 @@ void explain_distances(const std::vector<PlaneCheck>& checks, PoseList& poses) {
     if (!check.before || !check.before->trueness) continue;
     const double percent = check.before->trueness->scale_percent;
     if (std::abs(percent) < kReportedPercentMin) continue;
-    poses.explain(check.name, fmt::format("; by the poses of the board, distances on it are measured {:.2f} % too {}",
+    poses.explain(check.name, fmt::format("; measured with the poses of the board, distances on it are {:.2f} % too {}",
                                           std::abs(percent), percent > 0 ? "long" : "short"));
   }
 }
@@ -238,7 +236,7 @@ CalibrationOutcome report(const Adjustment& adjustment, Observations observation
   outcome.warnings = adjustment.warnings();
   std::ranges::copy(board_warnings(outcome.board), std::back_inserter(outcome.warnings));
   if (poses.lacks(PoseSubject::kPlane)) {
-    outcome.warnings.push_back("no look at the reference plane could be used, so that the poses alone were");
+    outcome.warnings.push_back("no view of the reference plane could be used, so the calibration uses only the poses");
   }
   outcome.verdict = judge(outcome);
   outcome.calibration.report = file_report(outcome, adjustment);

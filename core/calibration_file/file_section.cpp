@@ -58,7 +58,7 @@ std::string FileSection::text(const char* key) {
   if (node == nullptr) return {};
   const std::string& value = node->text;
   if (value.empty() || value.size() > kMaxTextLength || std::any_of(value.begin(), value.end(), is_control)) {
-    refuse(key, "must be a text in quotes, of 1 to " + std::to_string(kMaxTextLength) + " bytes");
+    refuse(key, "must be a string in quotes, of 1 to " + std::to_string(kMaxTextLength) + " bytes");
     return {};
   }
   return value;
@@ -83,7 +83,7 @@ std::vector<double> FileSection::elements(const char* key, int& rows, int& colum
   std::vector<double> values;
   for (const FileNode& item : items) values.push_back(item.kind == Kind::kNumber ? item.number : kNone);
   if (!std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); })) {
-    refuse(key, "holds something that is not a finite number");
+    refuse(key, "must hold only finite numbers");
   }
   return values;
 }

@@ -82,7 +82,7 @@ class TreeReader {
     for (Event event = next(); event && event->type != YAML_STREAM_END_EVENT; event = next()) {
       if (event->type != YAML_DOCUMENT_START_EVENT) continue;
       if (std::exchange(begun_, true)) {
-        refuse(*event, "begins another document: a calibration file has one");
+        refuse(*event, "begins a second document: a calibration file has one");
         break;
       }
       if (const Event first = next()) root = node(*first, 0);
@@ -103,7 +103,7 @@ class TreeReader {
     auto made = std::make_unique<yaml_event_t>();
     if (yaml_parser_parse(&parser_, made.get()) != 0) return Event(made.release());
     const std::string what =
-        "is no YAML: " + std::string(parser_.problem != nullptr ? parser_.problem : "out of memory");
+        "is not YAML: " + std::string(parser_.problem != nullptr ? parser_.problem : "out of memory");
     if (parser_.error == YAML_READER_ERROR) {  // this error has no position
       const auto bad = static_cast<std::ptrdiff_t>(std::min(parser_.problem_offset, text_.size()));
       problem_ = SyntaxProblem{static_cast<int>(std::count(text_.begin(), text_.begin() + bad, '\n')) + 1, what};
@@ -152,11 +152,11 @@ class TreeReader {
   FileNode map(int depth) {
     FileNode result{.kind = Kind::kMap};
     for (Event event = next(); event && event->type != YAML_MAPPING_END_EVENT; event = next()) {
-      if (event->type != YAML_SCALAR_EVENT) return refuse(*event, "has a key that is no text"), result;
+      if (event->type != YAML_SCALAR_EVENT) return refuse(*event, "has a key that is not a string"), result;
       const std::string key(text_of(event->data.scalar.value, event->data.scalar.length));
       const bool twice = std::ranges::any_of(result.entries, [&](const auto& entry) { return entry.first == key; });
-      if (twice) refuse(*event, key + " is there twice");
-      if (result.entries.size() == kMaxKeys) refuse(*event, "there are too many keys");
+      if (twice) refuse(*event, key + " appears twice");
+      if (result.entries.size() == kMaxKeys) refuse(*event, "has too many keys");
       if (const Event value = next()) result.entries.emplace_back(key, node(*value, depth + 1));
     }
     return result;
@@ -170,7 +170,7 @@ class TreeReader {
 
   FileNode repeated(const yaml_event_t& event) {
     const auto found = named_.find(name_of(event.data.alias.anchor));
-    if (found == named_.end()) return refuse(event, "repeats a name that is not there"), FileNode{};
+    if (found == named_.end()) return refuse(event, "refers to an unknown anchor"), FileNode{};
     const auto& [value, size] = found->second;
     if (nodes_ += size; nodes_ > kMaxNodes) return refuse(event, "holds too many values for a calibration"), FileNode{};
     return value;

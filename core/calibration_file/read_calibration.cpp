@@ -54,8 +54,8 @@ Lens read_lens(FileSection& section, const LensKeys& keys) {
   read_pinhole(section, keys.matrix, lens);
   Eigen::Map<Eigen::Matrix<double, 5, 1>>(lens.distortion.data()) =
       section.vector(keys.distortion, 5,
-                     "slsd takes OpenCV's k1 k2 p1 p2 k3, and no fisheye, rational, thin prism or tilted model; slsd "
-                     "--calibrate makes such a calibration");
+                     "slsd reads OpenCV's k1 k2 p1 p2 k3, not a fisheye, rational, thin prism or tilted model; slsd "
+                     "--calibrate writes such a calibration");
   if (!section.error() && !lens.invertible()) {
     section.refuse(keys.distortion,
                    "cannot be inverted over the whole image; calibrate again, with views in the corners");
@@ -112,7 +112,7 @@ std::vector<CalibrationReport::DepthSigma> read_depth_sigma(FileSection& section
   const Eigen::VectorXd depths = section.vector("depth_mm", 3), sigmas = section.vector("depth_sigma_mm", 3);
   std::vector<CalibrationReport::DepthSigma> out;
   for (Eigen::Index i = 0; i < 3; ++i) {
-    if (depths(i) <= (i == 0 ? 0 : depths(i - 1))) section.refuse("depth_mm", "must grow, from above 0");
+    if (depths(i) <= (i == 0 ? 0 : depths(i - 1))) section.refuse("depth_mm", "must increase, from above 0");
     if (sigmas(i) < 0) section.refuse("depth_sigma_mm", "must not be negative");
     out.push_back({depths(i), sigmas(i)});
   }
@@ -145,7 +145,7 @@ std::optional<Error> read_cameras(const std::vector<FileNode>& items, std::strin
   for (const FileNode& node : items) {
     FileSection section(node, {}, std::string(name));
     CalibratedCamera camera = read_camera(section, calibration.cameras.size());
-    if (!names.insert(camera.name).second) section.refuse("name", "is another camera's name already");
+    if (!names.insert(camera.name).second) section.refuse("name", "is already another camera's name");
     serials.push_back(section.has("serial") ? section.text("serial") : std::string());
     sigmas.push_back(read_sigma(section, "camera_sigma"));
     if (section.error()) return section.error();
@@ -161,19 +161,19 @@ std::optional<Error> read_cameras(const std::vector<FileNode>& items, std::strin
 /// Names the other kind of calibration file that this is, and what to do; empty if it is no known kind.
 std::string other_kind(const FileNode& root) {
   constexpr const char* kWanted =
-      ": slsd takes one calibration of camera and projector together, in OpenCV's YAML with k1 k2 p1 p2 k3, which slsd "
-      "--calibrate makes";
+      ": slsd reads one calibration of camera and projector together, in OpenCV's YAML with k1 k2 p1 p2 k3, as slsd "
+      "--calibrate writes it";
   const bool is_ours = root.find("projector_width") != nullptr || root.find("cameras") != nullptr;
   if (is_ours) return {};
-  if (root.kind != FileNode::Kind::kMap) return std::string("is no calibration file") + kWanted;
+  if (root.kind != FileNode::Kind::kMap) return std::string("is not a calibration file") + kWanted;
   const auto has = [&](const char* key) { return root.find(key) != nullptr; };
   if (has("cam0") || has("cam1")) return std::string("is a calibration of Kalibr") + kWanted;
   if (has("image_width") && (has("distortion_model") || has("camera_name") || has("projection_matrix"))) {
-    return std::string("is a camera_info file of ROS, of a camera alone") + kWanted;
+    return std::string("is a camera_info file of ROS, for a camera without a projector") + kWanted;
   }
   const bool of_opencv = has("camera_matrix") || has("cameraMatrix") || has("K") || has("M1") || has("K1") ||
                          has("distortion_coefficients") || has("distCoeffs") || has("D1");
-  return of_opencv ? std::string("is a calibration of cameras alone") + kWanted : std::string();
+  return of_opencv ? std::string("is a calibration of cameras without a projector") + kWanted : std::string();
 }
 
 /// Names the syntax of a file that is not YAML, by its first character; null if it may be YAML.
@@ -206,10 +206,11 @@ Result<Calibration> read_root(const FileNode& root, std::string_view name) {
 
 Result<Calibration> read_calibration(std::string_view text, std::string_view name) {
   const std::string where(name);
-  if (text.size() > kMaxFileSize) return fail(ErrorCode::kMalformed, "is no calibration file: above 1 MiB", where);
+  if (text.size() > kMaxFileSize)
+    return fail(ErrorCode::kMalformed, "is not a calibration file: it exceeds 1 MiB", where);
   if (const char* const what = other_syntax(text)) {
     return fail(ErrorCode::kMalformed,
-                std::string("holds ") + what + ": slsd takes OpenCV's YAML, which slsd --calibrate makes", where);
+                std::string("holds ") + what + ": slsd reads OpenCV's YAML, as slsd --calibrate writes it", where);
   }
   const auto root = read_file_tree(text);
   if (!root) return fail(ErrorCode::kMalformed, root.error().message, where + ":" + std::to_string(root.error().line));

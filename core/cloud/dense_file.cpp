@@ -74,7 +74,7 @@ Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals
   const std::size_t end = bytes.find(kDataBegins);
   const int width = end == std::string_view::npos ? 0 : number_after(bytes.substr(0, end), "\nWIDTH ");
   if (width <= 0 || height <= 0)
-    return fail(ErrorCode::kMalformed, "the cloud is no organised PCD: its header has no size");
+    return fail(ErrorCode::kMalformed, "the cloud is not an organised PCD: its header has no size");
   const std::string_view records = bytes.substr(end + kDataBegins.size());
   const DensePcd cloud(records, width, height, normals);
   if (records.size() < cloud.record(0).size() * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))

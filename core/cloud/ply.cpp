@@ -104,16 +104,15 @@ Result<Cloud> read_ply(std::string_view bytes, std::string_view name) {
   header.expect(property_lines());
   const std::string where(name);
   if (!header.problem().empty()) {
-    return fail(ErrorCode::kMalformed, "is no cloud of slsd: expected \"" + header.problem() + "\"", where);
+    return fail(ErrorCode::kMalformed, "is not a cloud of slsd: expected \"" + header.problem() + "\"", where);
   }
   if (header.rest().size() != count * kPointBytes) {
-    return fail(ErrorCode::kMalformed, "is cut short or too long: expected " + std::to_string(count) + " points",
-                where);
+    return fail(ErrorCode::kMalformed, "is cut off or too long: expected " + std::to_string(count) + " points", where);
   }
   cloud.points.reserve(count);
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto point = read_point(header.rest().data() + i * kPointBytes);
-    if (!point) return fail(ErrorCode::kMalformed, "names no cell in point " + std::to_string(i), where);
+    if (!point) return fail(ErrorCode::kMalformed, "has no valid cell in point " + std::to_string(i), where);
     cloud.points.push_back(*point);
   }
   return cloud;

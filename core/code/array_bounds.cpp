@@ -67,7 +67,7 @@ std::optional<std::string> forbidding_bound(const ArrayOptions& options, int min
   if (needed > usable_words(options))
     return "pigeonhole bound: " + array_in_words(options) + ", but " + letters + " have only " +
            grouped(usable_words(options)) +
-           (options.half_turn_unique ? " words that differ from their own turn" : " words of 3x3");
+           (options.half_turn_unique ? " words that differ from themselves when turned" : " words of 3x3");
   const std::int64_t singleton = power(options.letters, kWindowCells - minimum_distance + 1);
   if (needed > singleton)
     return "Singleton bound: " + array_in_words(options) + ", but " + letters + " have at most " + grouped(singleton) +

@@ -44,7 +44,7 @@ Result<CodeArray> verified(CodeArray array, const ArrayOptions& options, int dis
   assert(array.minimum_distance >= distance);
   if (array.minimum_distance >= distance) return array;
   return fail(ErrorCode::kImpossible,
-              "the array that was constructed fails its check: distance " + std::to_string(array.minimum_distance));
+              "the constructed array fails its check: distance " + std::to_string(array.minimum_distance));
 }
 
 Result<CodeArray> construct_with(const ArrayOptions& options, int distance) {
@@ -107,7 +107,7 @@ class WithoutRepeats {
   [[nodiscard]] std::string searched_in_vain_for(RunReach reach) const {
     return "found no " + std::to_string(options_.rows) + "x" + std::to_string(options_.columns) + " array of " +
            std::to_string(options_.letters) + " letters with minimum distance " + std::to_string(distance_) +
-           " in which no run recurs within " + std::to_string(reach.along_rows) + " columns and " +
+           " without a run that recurs within " + std::to_string(reach.along_rows) + " columns and " +
            std::to_string(reach.along_columns) +
            " rows, within the search budget: try another seed, more letters, larger symbols, or a smaller row_reach, "
            "column_reach or minimum distance";
@@ -120,7 +120,7 @@ class WithoutRepeats {
                       made_.column_reach >= std::min(reach_.along_columns, options_.rows - kShortestRun);
     assert(kept);
     if (kept) return verified(std::move(made_), options_, distance_);
-    return fail(ErrorCode::kImpossible, "the array that was constructed fails its check: runs recur within " +
+    return fail(ErrorCode::kImpossible, "the constructed array fails its check: runs recur within " +
                                             std::to_string(made_.row_reach) + " columns and " +
                                             std::to_string(made_.column_reach) + " rows");
   }
@@ -162,7 +162,7 @@ Result<> check_reach(const ArrayOptions& options) {
   for (const int reach : {options.row_reach.value_or(0), options.column_reach.value_or(0)})
     if (reach < 0 || reach > kMaxArrayExtent) return refuse("row_reach and column_reach must be 0 to 512");
   if (options.row_reach == 0 && options.column_reach == 0)
-    return refuse("row_reach and column_reach are both 0, and nothing is asked of runs: use method = \"constructive\"");
+    return refuse("row_reach and column_reach are both 0, so runs may recur: use method = \"constructive\"");
   return {};
 }
 
@@ -183,13 +183,13 @@ Result<> ArrayOptions::validate() const {
   const auto refuse = [](const char* what) { return fail(ErrorCode::kInvalidArgument, what); };
   if (rows < kWindowSide || columns < kWindowSide || rows > kMaxArrayExtent || columns > kMaxArrayExtent)
     return refuse("rows and columns of the array must be 3 to 512");
-  if (letters < kMinLetters || letters > kMaxLetters) return refuse("an array has 2 to 8 letters");
+  if (letters < kMinLetters || letters > kMaxLetters) return refuse("an array must have 2 to 8 letters");
   if (minimum_distance && (*minimum_distance < 1 || *minimum_distance > kWindowCells))
     return refuse("minimum_distance must be 1 to 9");
   if (method == ArrayMethod::kPaper && (minimum_distance || half_turn_unique))
     return refuse(
-        "the paper's method promises neither minimum_distance nor half_turn_unique: leave both out, or use "
-        "the constructive method");
+        "the paper's method guarantees neither minimum_distance nor half_turn_unique: leave both out, or use the "
+        "constructive method");
   return check_reach(*this);
 }
 

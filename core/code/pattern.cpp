@@ -21,7 +21,7 @@ Result<> check_symbols(const std::vector<int>& symbols) {
   for (auto at = symbols.begin(); at != symbols.end(); ++at) {
     if (auto valid = in_range("each of symbols", *at, 1, kSymbolCount); !valid) return valid;
     if (std::find(symbols.begin(), at, *at) != at)
-      return fail(ErrorCode::kInvalidArgument, "symbols must differ: " + std::to_string(*at) + " is named twice");
+      return fail(ErrorCode::kInvalidArgument, "symbols must differ: " + std::to_string(*at) + " appears twice");
   }
   return {};
 }

@@ -142,7 +142,7 @@ void check_reach(KeyReader& reader, const toml::table& table, Pattern& pattern) 
     reader.refuse(table, ErrorCode::kMismatch,
                   "runs of \"letters\" recur after " + std::to_string(array.row_reach + 1) + " columns or " +
                       std::to_string(array.column_reach + 1) +
-                      " rows, sooner than the file promises: a letter was changed; make the pattern anew");
+                      " rows, sooner than the file states: a letter was changed; create the pattern again");
 }
 
 // Recompute what the file promises: a letter changed by hand or in transit must not cause a wrong point.
@@ -154,13 +154,13 @@ void check_promises(KeyReader& reader, const toml::table& table, Pattern& patter
   if (found < std::max(promised, pattern.options.minimum_distance.value_or(0)))
     reader.refuse(table, ErrorCode::kMismatch,
                   "the windows of \"letters\" have minimum distance " + std::to_string(found) +
-                      ", less than the file promises: a letter was changed; make the pattern anew");
+                      ", less than the file states: a letter was changed; create the pattern again");
   if (pattern.options.method == ArrayMethod::kPaper && !aligned_windows_differ(pattern.array))
     reader.refuse(table, ErrorCode::kMismatch,
-                  "two aligned windows of \"letters\" are equal: a letter was changed; make the pattern anew");
+                  "two aligned windows of \"letters\" are equal: a letter was changed; create the pattern again");
   if (pattern.options.method != ArrayMethod::kPaper && found < 1)
     reader.refuse(table, ErrorCode::kMismatch,
-                  "two windows of \"letters\" are equal: a letter was changed; make the pattern anew");
+                  "two windows of \"letters\" are equal: a letter was changed; create the pattern again");
   if (pattern.options.method == ArrayMethod::kNoRepeats) return check_reach(reader, table, pattern);
   if (table.contains("row_reach") || table.contains("column_reach"))
     reader.refuse(table, ErrorCode::kInvalidArgument, "row_reach and column_reach need method = \"no_repeats\"");
@@ -198,7 +198,7 @@ std::string write_pattern(const Pattern& pattern) {
 
 Result<Pattern> read_pattern(std::string_view text, std::string_view name) {
   if (text.size() > kMaxTextBytes)
-    return fail(ErrorCode::kMalformed, "larger than any pattern file can be", std::string(name));
+    return fail(ErrorCode::kMalformed, "too large for a pattern file", std::string(name));
   try {
     return pattern_from(toml::parse(text, name), name);
   } catch (const toml::parse_error& error) {

@@ -60,8 +60,8 @@ Result<Decoder> Decoder::create(const IndexedPattern& indexed, const Calibration
   if (projector.width_px != pattern.options.projector_width_px ||
       projector.height_px != pattern.options.projector_height_px) {
     return fail(ErrorCode::kMismatch,
-                "the calibration is of a projector of " + size_text(projector.width_px, projector.height_px) +
-                    " pixels, the pattern is for " +
+                "the calibration is for a projector of " + size_text(projector.width_px, projector.height_px) +
+                    " pixels, but the pattern is for " +
                     size_text(pattern.options.projector_width_px, pattern.options.projector_height_px) +
                     "; calibrate with this projector, or set the projector's size to the calibrated one");
   }
@@ -100,7 +100,7 @@ Result<> Decoder::check_size(const GreyView& frame) const {
   const Lens& lens = parts_->camera.lens;
   if (width == lens.width_px && height == lens.height_px) return {};
   return fail(ErrorCode::kMismatch, "the frame has " + size_text(width, height) +
-                                        " pixels, the camera was calibrated with " +
+                                        " pixels, but the camera was calibrated with " +
                                         size_text(lens.width_px, lens.height_px) +
                                         "; set the camera to the calibrated size, or calibrate again");
 }

@@ -21,18 +21,18 @@ Result<> DenseOptions::validate() const {
 
 Result<> DecodeOptions::validate() const {
   if (!(depth_min_mm > 0))
-    return fail(ErrorCode::kInvalidArgument, "depth_min_mm has to be greater than 0", "decode.depth_min_mm");
+    return fail(ErrorCode::kInvalidArgument, "depth_min_mm must be greater than 0", "decode.depth_min_mm");
   if (!(depth_max_mm > depth_min_mm) || !std::isfinite(depth_max_mm)) {
-    return fail(ErrorCode::kInvalidArgument, "depth_max_mm has to be greater than depth_min_mm, and finite",
+    return fail(ErrorCode::kInvalidArgument, "depth_max_mm must be greater than depth_min_mm, and finite",
                 "decode.depth_max_mm");
   }
   if (!(wrong_cells_max >= 1e-9 && wrong_cells_max <= 1)) {
-    return fail(ErrorCode::kInvalidArgument, "wrong_cells_max must be 1e-9 to 1: how many a frame may have, on average",
+    return fail(ErrorCode::kInvalidArgument, "wrong_cells_max must be 1e-9 to 1 wrong cells per frame on average",
                 "decode.wrong_cells_max");
   }
   if (precision == Precision::kFine && centre == Method::kPaper) {
     return fail(ErrorCode::kInvalidArgument,
-                "precision = \"fine\" aligns symbols and takes no centroids; leave centre at \"default\"",
+                "precision = \"fine\" aligns symbols and does not use centroids; leave centre at \"default\"",
                 "decode.precision");
   }
   return dense.validate();

@@ -114,7 +114,7 @@ Result<> check_sizes(const GreyView& pattern, const GreyView& white, const std::
     const auto [other_width, other_height] = size_of(*other);
     return fail(ErrorCode::kMismatch, std::string("the ") + name + " image has " +
                                           size_text(other_width, other_height) + " pixels, the white one " +
-                                          size_text(width, height) + "; all have to come from one camera in one mode");
+                                          size_text(width, height) + "; take all with one camera in one mode");
   }
   return {};
 }

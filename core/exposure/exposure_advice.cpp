@@ -106,31 +106,30 @@ std::string_view to_string(Trouble trouble) {
 std::string_view remedy(Trouble trouble) {
   switch (trouble) {
     case Trouble::kNoPattern:
-      return "the pattern is not seen: point camera and projector at the object, take the caps off, see slsctl frame; "
-             "if the frame is dark allow a longer exposure";
+      return "the pattern is not visible: point camera and projector at the object, take the caps off, and look at "
+             "slsctl frame; if the frame is dark, allow a longer exposure";
     case Trouble::kTooMuchLight:
       return "too bright even with the shortest exposure that suits the projector: close the aperture, put a grey "
              "filter on the lens, or dim the projector";
     case Trouble::kTooLittleLight:
-      return "too dark even with the longest exposure and the highest gain allowed: open the aperture, come nearer, "
-             "take a brighter projector, or coat the object";
+      return "too dark even with the longest exposure and the highest gain allowed: open the aperture, move closer, "
+             "use a brighter projector, or coat the object";
     case Trouble::kAmbient:
-      return "the light of the room is nearly as strong as the projector's, which no exposure changes: darken the "
-             "room, come nearer, or put a filter for the projector's light on the lens";
+      return "room light is nearly as strong as the projector's, which no exposure changes: darken the room, move "
+             "closer, or put a filter for the projector's light on the lens";
     case Trouble::kBlurred:
-      return "the symbols' edges run into one another: focus camera and projector, close the aperture, come nearer, or "
-             "take larger symbols; of what moves a shorter exposure is sharper";
+      return "the symbols' edges blur into each other: focus camera and projector, close the aperture, move closer, or "
+             "use larger symbols; expose moving objects for a shorter time";
     case Trouble::kNoisy:
-      return "the symbols hardly stand out of what changes from frame to frame: take less gain and more light, and let "
-             "nothing move";
+      return "the symbols hardly stand out from the noise: use less gain and more light, and let nothing move";
     case Trouble::kUneven:
       return "the brightest symbols are more than 20 times as bright as the faintest: turn the object, move the "
-             "projector away, or coat what shines or is black";
+             "projector away, or coat shiny and black parts";
     case Trouble::kMoves:
-      return "the scene moves between two frames: hold it still and look again, or keep the exposure as short as here";
+      return "the scene moves between two frames: hold it still and measure again, or keep the exposure this short";
     case Trouble::kFlickers:
-      return "the brightness changes from frame to frame: set whole periods of the projector and the lamps, and check "
-             "[projector] refresh_hz and [scan] power_line_hz";
+      return "the brightness flickers from frame to frame: expose for whole periods of the projector and the lamps, "
+             "and check [projector] refresh_hz and [scan] power_line_hz";
   }
   return {};
 }

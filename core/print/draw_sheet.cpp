@@ -75,9 +75,8 @@ void draw_rulers(cairo_t* pen, const Sheet& sheet) {
 }
 
 void draw_text(cairo_t* pen, const Sheet& sheet) {
-  const std::string text = to_string(sheet.board) +
-                           "    print at 100 %, not fit to page; then hold a rule to both "
-                           "rulers: they are in mm";
+  const std::string text =
+      to_string(sheet.board) + "    print at 100 %, not \"fit to page\"; then measure both rulers: they are in mm";
   cairo_set_font_size(pen, kTextHeightMm);
   cairo_text_extents_t extents;
   cairo_text_extents(pen, text.c_str(), &extents);
@@ -103,7 +102,7 @@ cairo_status_t append(void* bytes, const unsigned char* from, unsigned count) {
 }
 
 tl::unexpected<Error> refuse(cairo_status_t status) {
-  return fail(ErrorCode::kIo, std::string("the sheet could not be drawn: ") + cairo_status_to_string(status));
+  return fail(ErrorCode::kIo, std::string("cannot draw the sheet: ") + cairo_status_to_string(status));
 }
 
 Result<> draw_on(cairo_surface_t* surface, double scale, const Sheet& sheet) {
@@ -147,7 +146,7 @@ Result<Grey8> sheet_image(const Sheet& sheet, double dpi) {
   const double width = std::round(sheet.paper.width_mm / 25.4 * dpi);
   const double height = std::round(sheet.paper.height_mm / 25.4 * dpi);
   if (!(std::max(width, height) <= kMaxSidePx) || !(std::min(width, height) >= 1)) {
-    return fail(ErrorCode::kInvalidArgument, "a side of the sheet would have more than 32767 px; give a smaller --dpi");
+    return fail(ErrorCode::kInvalidArgument, "the sheet would exceed 32767 px on a side; give a smaller --dpi");
   }
   Grey8 image(static_cast<int>(width), static_cast<int>(height));
   const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_A8, image.width(), image.height()),

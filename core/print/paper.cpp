@@ -46,7 +46,7 @@ Result<Paper> parse_paper(std::string_view text) {
   const auto width = length(text.substr(0, middle));
   const auto height = middle == text.npos ? std::nullopt : length(text.substr(middle + 1));
   if (width && height) return Paper{std::string(text) + " mm", *width, *height};
-  return fail(ErrorCode::kInvalidArgument, "no paper is called \"" + std::string(text) +
+  return fail(ErrorCode::kInvalidArgument, "unknown paper \"" + std::string(text) +
                                                "\"; give A0, A1, A2, A3, A4, letter or WIDTHxHEIGHT, each of 50 to "
                                                "10000 mm");
 }

@@ -63,7 +63,7 @@ Result<Sheet> lay_out(const Board& board, const Paper& paper) {
   const Eigen::Vector2d size = size_needed(board);
   if (!fits(board, paper)) {
     return fail(ErrorCode::kImpossible, describe(board) + " needs " + size_text(size.x(), size.y()) +
-                                            " with its border and rulers, and " + paper.name + " has " +
+                                            " with its border and rulers, but " + paper.name + " has " +
                                             size_text(paper.width_mm, paper.height_mm) + "; " + advice(board));
   }
   const double clear = clear_around(board);
@@ -78,7 +78,7 @@ Result<Board> board_for(const Paper& paper) {
   while (square_mm >= kLeastSquareMm && !fits(charuco_of(square_mm), lying)) --square_mm;
   if (square_mm >= kLeastSquareMm) return charuco_of(square_mm);
   return fail(ErrorCode::kImpossible,
-              "no board of squares of 5 mm fits on " + paper.name + " with its rulers; give larger --paper");
+              "no board with squares of 5 mm fits on " + paper.name + " with its rulers; give a larger --paper");
 }
 
 }  // namespace slsd

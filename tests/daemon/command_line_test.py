@@ -516,7 +516,7 @@ class Slsctl(unittest.TestCase):
             self.assertEqual(self.slsctl(command, file, "--camera", "camera").returncode, 0)
             result = self.slsctl(command, file, "--camera", "camra")
             self.assertEqual(result.returncode, 1)
-            self.assertIn('no camera is called "camra"; there are: camera', result.stderr)
+            self.assertIn('no camera is called "camra"; configured: camera', result.stderr)
 
     def test_a_depth_map_and_normals_are_of_pixels(self):
         done = self.slsctl("scan", self.folder / "d.tiff", "--timeout-ms", "600000")

@@ -70,8 +70,8 @@ std::string facts_of(const CameraRig& rig, const DepthRange& range) {
   std::string facts = lens_facts("camera_matrix", rig.camera.lens, camera_likelihood(rig.camera.lens)) +
                       lens_facts("projector_matrix", rig.projector, projector_likelihood(rig.projector));
   facts += fmt::format(
-      "camera and projector are {} apart, so from {:.0f} to {:.0f} mm the light moves by {} px, and "
-      "{:.0f} mm is known to {}",
+      "camera and projector are {} apart; from {:.0f} to {:.0f} mm the light moves by {} px, and at {:.0f} mm depth is "
+      "exact to {}",
       length_text(outlook.baseline_mm), range.min_mm, range.max_mm, in_two_digits(outlook.parallax_px),
       range.middle_mm(), length_text(outlook.sigma_mm));
   if (outlook.lit_share < kHardlyLit) {
@@ -94,8 +94,8 @@ std::string rig_doubt(const CameraRig& rig, const DepthRange& range) {
            ". As it is: " + facts_of(rig, range);
   }
   if (given > kImpossible) return {};
-  return "no such rig can measure: " + facts_of(rig, range) +
-         ". Look at the calibration, and at depth_min_mm and depth_max_mm; slsd --calibrate makes a new one";
+  return "such a rig cannot measure: " + facts_of(rig, range) +
+         ". Check the calibration, depth_min_mm and depth_max_mm, or calibrate again with slsd --calibrate";
 }
 
 /// Difference between two motions.
@@ -123,7 +123,7 @@ std::string detour_doubt(const CalibratedCamera& first, const CalibratedCamera& 
   };
   const Disagreement now = off(given);
   if (!now.is_large(length_mm)) return {};
-  std::string advice = "one of the two is of another rig: calibrate again";
+  std::string advice = "one of the two belongs to another rig: calibrate again";
   for (const auto& [meant, text] :
        {std::pair{given, ""}, std::pair{given.inverse(), "looks inverted (camera_from_rig): invert it"}}) {
     for (const auto& [mm, unit] : {std::pair{1.0, ""}, std::pair{1000.0, "metres"}, std::pair{10.0, "centimetres"}}) {
@@ -205,17 +205,17 @@ std::string symbol_doubt(std::span<const Match> matches, const CameraRig& rig, c
   if (matches.size() < kSymbolsForDoubt || given.points_share >= kMost) return {};
   const std::vector<Misreading> misreadings = misreadings_of(rig);
   const std::vector<Ranked> meant = explaining(misreadings, matches, range, gate_px, kMost);
-  const std::string read = fmt::format("camera \"{}\": {} symbols of the pattern are read, and the calibration ",
+  const std::string read = fmt::format("camera \"{}\": {} symbols of the pattern were read, but the calibration ",
                                        rig.camera.name, matches.size());
   const std::string advice = meant.empty() ? "" : "; " + advice_of(meant);
   if (given.on_line_share >= kMost) {
     const std::string set = fmt::format(
-        ", out of the working range: set depth_min_mm ({:g}) and depth_max_mm ({:g}) if that is where they are",
+        ", outside the working range: set depth_min_mm ({:g}) and depth_max_mm ({:g}) if they really are there",
         range.min_mm, range.max_mm);
     return read + depths_text(given.depths_mm) + (given.depths_mm[given.depths_mm.size() / 2] > 0 ? set : "") + advice;
   }
-  return read + fmt::format("has them {:.0f} px off their epipolar lines", median_of(given.residuals_px)) +
-         (meant.empty() ? ": it is of another rig, or projector or camera were moved: calibrate again" : advice);
+  return read + fmt::format("puts them {:.0f} px off their epipolar lines", median_of(given.residuals_px)) +
+         (meant.empty() ? ": it belongs to another rig, or the projector or a camera moved: calibrate again" : advice);
 }
 
 }  // namespace slsd

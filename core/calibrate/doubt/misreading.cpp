@@ -82,7 +82,7 @@ void add_sizes(const CameraRig& rig, std::vector<Misreading>& found) {
   constexpr double kShare = 0.003;
   for (const double factor : {2.0, 4.0, 1.5, 0.5, 0.25, 1 / 1.5}) {
     const auto advice = [&](const char* key, const Lens& lens) {
-      return fmt::format("{} looks like that of images of {:.0f}x{:.0f} px: multiply fx, fy, cx and cy by {:.4g}", key,
+      return fmt::format("{} looks made for images of {:.0f}x{:.0f} px: multiply fx, fy, cx and cy by {:.4g}", key,
                          lens.width_px / factor, lens.height_px / factor, factor);
     };
     Misreading camera{advice("camera_matrix", rig.camera.lens), std::log(kShare), rig};
@@ -95,7 +95,7 @@ void add_sizes(const CameraRig& rig, std::vector<Misreading>& found) {
 
 void add_swapped(const CameraRig& rig, std::vector<Misreading>& found) {
   constexpr double kShare = 0.01;
-  Misreading swapped{"camera_matrix and projector_matrix look swapped: exchange them, with their distortions",
+  Misreading swapped{"camera_matrix and projector_matrix look swapped: swap them back, with their distortions",
                      std::log(kShare), rig};
   Lens &camera = swapped.rig.camera.lens, &projector = swapped.rig.projector;
   std::swap(camera, projector);

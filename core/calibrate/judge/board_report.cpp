@@ -172,27 +172,25 @@ std::string bend_text(const BoardReport& board) {
 }
 
 std::string board_text(const BoardReport& board) {
-  if (board.is_bent()) return bend_text(board) + " in all poses alike, which the calibration is corrected for";
-  return fmt::format("flat, as far as the poses tell: {}", bend_text(board));
+  if (board.is_bent()) return bend_text(board) + " in all poses alike; the calibration corrects for it";
+  return fmt::format("flat, as far as the poses show: {}", bend_text(board));
 }
 
 std::vector<std::string> board_warnings(const BoardReport& board) {
   std::vector<std::string> warnings;
   if (!board.is_known()) {
     warnings.push_back(
-        fmt::format("the poses do not tell whether the board is flat: it is {}. Tilt it by 20 to 40 degrees towards "
-                    "all sides, in more poses, or {}",
+        fmt::format("the poses do not show whether the board is flat: it is {}. Tilt it by 20 to 40 degrees to all "
+                    "sides, in more poses, or {}",
                     bend_text(board), kMount));
   } else if (board.is_bent() && board.bend_mm > kFarBentShare * board.size_mm()) {
-    warnings.push_back(
-        fmt::format("the board is {}. The calibration is corrected for it, but a print so far from flat "
-                    "may change its shape from pose to pose: {}",
-                    bend_text(board), kMount));
+    warnings.push_back(fmt::format(
+        "the board is {}. The calibration corrects for it, but such a print may change its shape between poses: {}",
+        bend_text(board), kMount));
   }
   if (board.is_uneven()) {
     warnings.push_back(
-        fmt::format("the board is uneven: it lies off a smooth surface by {:.2f} mm (RMS), in all poses "
-                    "alike, which moves the calibration: {}",
+        fmt::format("the board is uneven by {:.2f} mm (RMS) in all poses alike, which distorts the calibration: {}",
                     board.uneven_mm, kMount));
   }
   return warnings;

@@ -49,7 +49,7 @@ constexpr double kCoveredShare = 0.08, kUncoveredShare = 0.5;
 constexpr double kErrorRatioShownMax = 100;
 /// Share of outlying points above which no other fault needs to be reported.
 constexpr double kHardlyAnyShare = 0.9;
-constexpr char kHardlyAny[] = "hardly a point of it agrees with them";
+constexpr char kHardlyAny[] = "almost no point of it agrees with them";
 
 /// The blurriest view of a pose.
 double blur_of(const PoseObservation& pose) {
@@ -219,15 +219,14 @@ FaultyPose explain(std::size_t pose, const std::string& error, const Observation
   const auto& surface = shown.surface;
   if (surface.before_share > kCoveredShare && surface.before_share < kUncoveredShare) {
     return {pose, PoseFault::kCovered,
-            fmt::format("something stood before the {}: {:.0f} % of the symbols lie about {:.0f} mm before it; keep "
+            fmt::format("something covered the {}: {:.0f} % of the symbols lie about {:.0f} mm in front of it; keep "
                         "hands and cables out of its light",
                         subject, 100 * surface.before_share, surface.before_mm)};
   }
   if (unshown_px(observations.poses[pose], rig, rig.rig_from_board[pose], surface.offset_mm) > kShownByPrintPx) {
     return {pose, PoseFault::kUnlike,
-            fmt::format("its symbols lie {:.0f} mm off the {}, which did not move between the pictures, as its print "
-                        "shows: the camera or the projector stood otherwise than in the other poses; fasten both, and "
-                        "take it again",
+            fmt::format("its symbols lie {:.0f} mm off the {}, although its print did not move between the pictures: "
+                        "the camera or the projector moved since the other poses; fasten both, and take it again",
                         std::abs(surface.offset_mm), subject)};
   }
   if (shown.is_bowed()) {
@@ -237,16 +236,15 @@ FaultyPose explain(std::size_t pose, const std::string& error, const Observation
                         subject, shown.surface.bow_mm, shown.bow_factor)};
   }
   if (shown.is_uneven()) {
-    return {
-        pose, PoseFault::kBent,
-        fmt::format("the {} is not flat: its symbols lie off any plane by {:.1f} mm, {:.0f} times as much as in the "
-                    "other poses; mount the print on a stiff plate, and hold it still",
-                    subject, shown.surface.flatness_mm, shown.flatness_factor)};
+    return {pose, PoseFault::kBent,
+            fmt::format("the {} is not flat: its symbols are {:.1f} mm off any plane, {:.0f} times as much as in the "
+                        "other poses; mount the print on a stiff plate, and hold it still",
+                        subject, shown.surface.flatness_mm, shown.flatness_factor)};
   }
   if (shown.is_moved()) {
     return {pose, PoseFault::kMoved,
-            fmt::format("the {} moved between the white picture and the pattern: by {:.1f} mm and {:.2f} degrees; "
-                        "hold it still, or lean it against something",
+            fmt::format("the {} moved by {:.1f} mm and {:.2f} degrees between the white picture and the pattern; hold "
+                        "it still, or lean it against something",
                         subject, std::abs(shown.surface.offset_mm), shown.surface.tilt_deg)};
   }
   return {pose, PoseFault::kUnlike, fmt::format("it contradicts the other poses: {}; take it again", error)};
@@ -306,15 +304,14 @@ std::vector<FaultyPose> find_unusable(const Observations& observations) {
                                     "it still, and within the depth of focus",
                                     blur, usual_blur)});
     } else if (shift_of(pose) > kShiftMaxPx) {
-      faulty.push_back(
-          {i, PoseFault::kMoved,
-           fmt::format("the board moved between the white picture and the pattern: its print by {:.0f} px; "
-                       "hold it still, or lean it against something",
-                       shift_of(pose))});
+      faulty.push_back({i, PoseFault::kMoved,
+                        fmt::format("the board's print moved by {:.0f} px between the white picture and the pattern; "
+                                    "hold it still, or lean it against something",
+                                    shift_of(pose))});
     } else if (same < i) {
       faulty.push_back({i, PoseFault::kRepeated,
-                        fmt::format("it shows the board where {} does, so that both count once; move, tilt or turn it "
-                                    "between the poses",
+                        fmt::format("it shows the board in the same place as {}, so both count once; move, tilt or "
+                                    "turn the board between poses",
                                     observations.poses[same].name)});
     }
   }

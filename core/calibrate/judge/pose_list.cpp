@@ -16,13 +16,13 @@ constexpr double kClippedToSay = 0.02;  // more than a session on hardware accep
 std::string text_of_gap(const PoseView& view) {
   if (view.hidden_clipped) {
     return fmt::format(
-        "clipped: where {} symbols should be seen, in one place, the white picture is at full level; turn "
-        "the reflection away, or expose less",
+        "clipped: the white picture is at full level where {} symbols should be; turn the reflection away, or expose "
+        "less",
         view.hidden_symbols);
   }
   return fmt::format(
-      "covered: {} symbols are not seen in one place, where the white picture shows the board; keep hands "
-      "and cables out of the light, and between the pictures too",
+      "covered: {} symbols are missing in one place, although the white picture shows the board there; keep hands and "
+      "cables out of the light in all pictures",
       view.hidden_symbols);
 }
 

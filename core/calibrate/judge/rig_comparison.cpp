@@ -47,12 +47,12 @@ std::string lens_change(const CalibrationOutcome& outcome, const std::string& de
   };
   const double least = kFocalMinShare * then.fx;
   if (differs(0, "fx", now.fx, then.fx, least) || differs(1, "fy", now.fy, then.fy, least)) {
-    return fmt::format("{} has another lens, zoom or focus: its focal length is {:.0f} px, and was {:.0f} px", text,
+    return fmt::format("{} has another lens, zoom or focus: its focal length is {:.0f} px, but was {:.0f} px", text,
                        now.fx, then.fx);
   }
   if (differs(2, "cx", now.cx, then.cx, kPrincipalMinPx) || differs(3, "cy", now.cy, then.cy, kPrincipalMinPx)) {
     return fmt::format(
-        "the picture of {} lies elsewhere on its lens: its middle is at ({:.0f}, {:.0f}) px, and was at "
+        "the image of {} is cropped or shifted differently: its principal point is at ({:.0f}, {:.0f}) px, but was at "
         "({:.0f}, {:.0f}) px",
         text, now.cx, now.cy, then.cx, then.cy);
   }
@@ -194,7 +194,7 @@ class Comparison {
                                   ? fmt::format("moved by {:.1f} mm", moved_mm)
                                   : "";
     if (pair.turn_deg() > kUpsideDownDeg && std::abs(turn.axis().z()) > kAboutAxis) {
-      return fmt::format("{} is upside down: it turned by {:.0f} degrees about its axis{}", device, pair.turn_deg(),
+      return fmt::format("{} turned by {:.0f} degrees about its axis, upside down{}", device, pair.turn_deg(),
                          moved.empty() ? "" : " and " + moved);
     }
     if (!pair.turned()) return device + " " + (moved.empty() ? "moved sideways" : moved);

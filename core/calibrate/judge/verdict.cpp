@@ -29,7 +29,7 @@ void judge_coverage(const CalibrationOutcome& outcome, Jury& jury) {
   const auto ask = [&](const Coverage& coverage, const std::string& device) {
     if (coverage.share() >= kCoverageGood) return;
     jury.lower(Grade::kUsable);
-    jury.verdict.reasons.push_back(fmt::format("the poses cover {:.0f} % of {}'s image, {:.0f} % are good",
+    jury.verdict.reasons.push_back(fmt::format("the poses cover {:.0f} % of {}'s image; good is {:.0f} %",
                                                100 * coverage.share(), device, 100 * kCoverageGood));
     jury.verdict.advice.push_back(fmt::format("show the board in {} of {}'s image", coverage.emptiest(), device));
   };
@@ -51,7 +51,7 @@ void judge_poses(const CalibrationOutcome& outcome, Jury& jury) {
     jury.verdict.reasons.push_back(
         fmt::format("no pose is tilted by more than {:.0f} degrees, which leaves the focal lengths uncertain",
                     std::ranges::max(tilts)));
-    jury.verdict.advice.push_back("tilt the board by 20 to 40 degrees, each time towards another side");
+    jury.verdict.advice.push_back("tilt the board by 20 to 40 degrees, each time to another side");
   }
   if (std::ranges::max(distances) < kDistanceSpread * std::ranges::min(distances)) {
     jury.verdict.advice.push_back("vary the board's distance over the working range");
@@ -63,25 +63,24 @@ void judge_poses(const CalibrationOutcome& outcome, Jury& jury) {
 Verdict judge(const CalibrationOutcome& outcome) {
   Jury jury;
   jury.judge(outcome.held_out_corner_px, kHeldOutPx,
-             fmt::format("corners of poses held out are off by {:.2f} px, {:.1f} px are good",
+             fmt::format("corners of held-out poses are off by {:.2f} px; good is {:.1f} px",
                          outcome.held_out_corner_px, kHeldOutPx.good));
   jury.judge(outcome.held_out_symbol_px, kHeldOutPx,
-             fmt::format("symbols of poses held out are off by {:.2f} px, {:.1f} px are good",
+             fmt::format("symbols of held-out poses are off by {:.2f} px; good is {:.1f} px",
                          outcome.held_out_symbol_px, kHeldOutPx.good));
   jury.judge(outcome.epipolar_rms_px, kEpipolarPx,
-             fmt::format("symbols lie off their epipolar lines by {:.2f} px, {:.1f} px are good",
-                         outcome.epipolar_rms_px, kEpipolarPx.good));
+             fmt::format("symbols lie {:.2f} px off their epipolar lines; good is {:.1f} px", outcome.epipolar_rms_px,
+                         kEpipolarPx.good));
   if (outcome.depth.empty()) {
     jury.lower(Grade::kBad);
-    jury.verdict.reasons.emplace_back(
-        "nowhere in the working range do the first camera and the projector see the same place");
+    jury.verdict.reasons.emplace_back("the first camera and the projector share no view in the working range");
     jury.verdict.advice.emplace_back(
-        "set depth_min_mm and depth_max_mm of [decode] to the distances that are scanned, or turn camera and projector "
+        "set depth_min_mm and depth_max_mm in [decode] to your scanning distances, or turn camera and projector "
         "towards each other and calibrate again");
   } else {
     const DepthUncertainty& middle = outcome.depth[outcome.depth.size() / 2];
     jury.judge(middle.calibration_mm / middle.depth_mm, kDepthShare,
-               fmt::format("the calibration leaves the depth at {:.0f} mm uncertain by {:.2f} mm, {:.2f} mm are good",
+               fmt::format("the calibration leaves depth at {:.0f} mm uncertain by {:.2f} mm; good is {:.2f} mm",
                            middle.depth_mm, middle.calibration_mm, kDepthShare.good * middle.depth_mm));
   }
   judge_coverage(outcome, jury);

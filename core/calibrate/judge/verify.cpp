@@ -160,8 +160,8 @@ Result<ViewCheck> check_view(const PoseView& view, const CalibratedCamera& camer
   const std::vector<MeasuredSymbol> symbols = measure(view, camera, projector);
   if (symbols.size() < kSymbolsMin) {
     return fail(ErrorCode::kNotFound,
-                fmt::format("{} of {} symbols can be measured and {} are needed: bring the board or plane into the "
-                            "light of the projector, or, if it is there, calibrate again",
+                fmt::format("only {} of {} symbols can be measured, but {} are needed: bring the board or plane into "
+                            "the projector's light; if it is there, calibrate again",
                             symbols.size(), view.symbols.size(), kSymbolsMin));
   }
   std::vector<Eigen::Vector3d> points;
@@ -169,10 +169,11 @@ Result<ViewCheck> check_view(const PoseView& view, const CalibratedCamera& camer
   const auto plane = fit_plane(points);
   const double share = plane ? static_cast<double>(plane->on_plane.size()) / static_cast<double>(points.size()) : 0;
   if (share < kOnPlaneMin) {
-    return fail(ErrorCode::kImpossible,
-                fmt::format("only {:.0f} % of the symbols lie on one plane: show a board, or one flat thing that fills "
-                            "the picture",
-                            100 * share));
+    return fail(
+        ErrorCode::kImpossible,
+        fmt::format(
+            "only {:.0f} % of the symbols lie on one plane: show a board, or a flat surface that fills the picture",
+            100 * share));
   }
   ViewCheck check;
   check.symbols = plane->on_plane.size();

@@ -32,12 +32,12 @@ std::ptrdiff_t lines(const PoseView& view, Eigen::Index axis) {
 std::string lack_of_corners(const PoseView& view) {
   if (view.corners.size() < kCornersMin) {
     return fmt::format(
-        "only {} of the board's corners were found, {} are the least; bring more of the board into the picture",
+        "only {} of the board's corners were found, but {} are needed; bring more of the board into the picture",
         view.corners.size(), kCornersMin);
   }
   if (std::min(lines(view, 0), lines(view, 1)) < kLinesMin) {
     return fmt::format(
-        "the {} corners found are along a line of the board, and have to be in two rows and two columns; bring more of "
+        "the {} corners found lie along one line of the board, but must fill two rows and two columns; bring more of "
         "the board into the picture",
         view.corners.size());
   }
@@ -47,8 +47,8 @@ std::string lack_of_corners(const PoseView& view) {
 std::string lack_of_symbols(std::size_t symbols) {
   if (symbols >= kSymbolsMin) return {};
   return fmt::format(
-      "only {} of the pattern's symbols were read on the board, {} are the least; hold it where the projector lights "
-      "it, in focus, and shade it from other light",
+      "only {} of the pattern's symbols were read on the board, but {} are needed; hold it in the projector's light, "
+      "in focus, and shade other light",
       symbols, kSymbolsMin);
 }
 

@@ -125,15 +125,15 @@ Result<std::vector<cv::Mat>> checked_images(const GrayCapture& capture, const Im
   const std::size_t expected = gray_code_images(projector);
   if (capture.code.size() != expected) {
     return fail(ErrorCode::kMismatch,
-                "there are " + std::to_string(capture.code.size()) + " images of the Gray code, " +
-                    std::to_string(expected) + " belong to a projector of " + std::to_string(projector.width_px) + "x" +
+                "the Gray code has " + std::to_string(capture.code.size()) + " images, but " +
+                    std::to_string(expected) + " fit a projector of " + std::to_string(projector.width_px) + "x" +
                     std::to_string(projector.height_px) + " pixels; set the projector's size to that of the captures");
   }
   const double full = guess_full_level(capture.white);  // full level of all images: a comparison needs one scale
   std::vector<cv::Mat> images{to_mat(capture.white, full), to_mat(capture.black, full)};
   for (const GreyView& image : capture.code) images.push_back(to_mat(image, full));
   if (std::ranges::any_of(images, [&](const cv::Mat& image) { return image.size() != images[0].size(); })) {
-    return fail(ErrorCode::kMismatch, "the images of the Gray code are not all of one size");
+    return fail(ErrorCode::kMismatch, "the images of the Gray code differ in size");
   }
   return images;
 }
@@ -157,7 +157,7 @@ Result<std::vector<cv::Point>> lit_pixels(const cv::Mat& white, const cv::Mat& b
                                           const std::function<bool(int x, int y)>& wanted) {
   auto lit = brighter_pixels(white, black, wanted);
   if (std::ssize(brighter_pixels(black, white, wanted)) > std::max(std::ssize(lit), kPixelsMin)) {
-    return fail(ErrorCode::kMismatch, "white.png is darker than black.png: exchange the two");
+    return fail(ErrorCode::kMismatch, "white.png is darker than black.png: swap the two");
   }
   return lit;
 }
@@ -252,9 +252,9 @@ Result<std::vector<ProjectedPoint>> read_gray_code(const GrayCapture& capture, c
   if (std::ssize(reading->seen) > kPixelsMin &&
       static_cast<double>(fitting) < kFittingShareMin * static_cast<double>(reading->seen.size())) {
     return fail(ErrorCode::kMismatch,
-                "neighbours in the picture are none in the Gray code: its pictures are not in the order of OpenCV's "
-                "GrayCodePattern::generate (columns, then rows; the highest bit first; each followed by its inverse), "
-                "or board or camera moved meanwhile");
+                "neighbouring pixels have distant Gray codes: the board or the camera moved, or the pictures are not "
+                "in the order of OpenCV's GrayCodePattern::generate (columns, then rows; highest bit first; each "
+                "followed by its inverse)");
   }
   return points;
 }

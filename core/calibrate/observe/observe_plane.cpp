@@ -8,9 +8,8 @@ namespace slsd {
 namespace {
 
 tl::unexpected<Error> nothing_seen() {
-  return fail(
-      ErrorCode::kNotFound,
-      "nothing of what is projected can be read; light the plane with the projector, in focus, without clipping");
+  return fail(ErrorCode::kNotFound,
+              "the projected code cannot be read; light the plane with the projector, in focus, without clipping");
 }
 
 }  // namespace

@@ -33,11 +33,11 @@ void clear_surroundings(const BoardRegion& region, Grey16& quotient) {
 std::string why_no_symbols(std::size_t shapes) {
   if (shapes > kPatternRegions) {
     return fmt::format(
-        "{} shapes are seen, but they are not those of the configured pattern: the pattern that was "
-        "projected, or the projector's size, is another one",
+        "{} shapes are visible, but not those of the configured pattern: the projected pattern or the projector's size "
+        "differs",
         shapes);
   }
-  return "none of the projected pattern is seen on the board; light it with the projector, in focus, without clipping";
+  return "the board shows nothing of the projected pattern; light it with the projector, in focus, without clipping";
 }
 
 }  // namespace
@@ -81,7 +81,7 @@ Result<> observe_pattern(const PosePictures& pictures, const Board& board, const
 
 Result<> observe_gray_code(const PosePictures& pictures, const Board& board, const BoardSighting& sighting,
                            const ImageSize& projector, PoseView& view) {
-  if (!pictures.black) return fail(ErrorCode::kNotFound, "the Gray code needs a picture under the black projector too");
+  if (!pictures.black) return fail(ErrorCode::kNotFound, "a Gray code also needs a picture under the black projector");
   const BoardRegion region(board, sighting);
   auto points = read_gray_code({pictures.white, *pictures.black, pictures.coded}, projector, [&](int x, int y) {
     return region.contains({x, y});
@@ -89,8 +89,7 @@ Result<> observe_gray_code(const PosePictures& pictures, const Board& board, con
   if (!points) return tl::unexpected(points.error());
   view.symbols = std::move(*points);
   if (view.symbols.empty()) {
-    return fail(ErrorCode::kNotFound,
-                "none of the Gray code can be read on the board; expose so that it is not clipped");
+    return fail(ErrorCode::kNotFound, "the Gray code cannot be read on the board; lower the exposure if it is clipped");
   }
   return {};
 }

@@ -121,7 +121,7 @@ std::string Adjustment::unplaced_text(const Observations& observations) const {
   for (std::size_t i = 0; i < equations_.poses.size(); ++i) {
     if (!is_placed(equations_.poses[i])) names += (names.empty() ? "" : ", ") + observations.poses[i].name;
   }
-  return names.empty() ? "" : "; these contradict the others, so that nothing of them counts: " + names;
+  return names.empty() ? "" : "; left out, because all their points contradict the others: " + names;
 }
 
 Result<> Adjustment::find_influence_of(const Observations& observations) {
@@ -224,11 +224,11 @@ Result<> Adjustment::compare_prints(Observations& observations) {
     options_.scale = false;
     return adjust_again(observations);
   }
-  warnings_.push_back(fmt::format(
-      "the board and the reference plane are not of one scale: by the plane, the board is {:.2f} +- {:.3f} % {} than "
-      "it should be. The plane was taken as the measure; hold a rule to the rulers of both prints, and give what they "
-      "measure by --ruler and --plane-ruler",
-      100 * std::abs(scale), 100 * sigma, scale > 0 ? "larger" : "smaller"));
+  warnings_.push_back(
+      fmt::format("the board and the reference plane differ in scale: compared with the plane, the board is {:.2f} +- "
+                  "{:.3f} % {} than it should be. slsd used the plane's scale; measure the rulers of both prints, and "
+                  "give the results with --ruler and --plane-ruler",
+                  100 * std::abs(scale), 100 * sigma, scale > 0 ? "larger" : "smaller"));
   return {};
 }
 
@@ -261,16 +261,15 @@ Result<> Adjustment::look_for_stretch(Observations& observations) {
 std::vector<std::string> Adjustment::warnings() const {
   std::vector<std::string> warnings = warnings_;
   if (!settled_) {
-    warnings.push_back(fmt::format(
-        "the adjustment had not settled after {} rounds, so that the result is not as good as its deviations say; take "
-        "more poses, at more angles and distances",
-        options_.iterations_max));
+    warnings.push_back(
+        fmt::format("the adjustment did not converge in {} iterations, so the result is worse than its deviations say; "
+                    "take more poses, at more angles and distances",
+                    options_.iterations_max));
   }
   if (!options_.stretch) return warnings;
   warnings.push_back(fmt::format(
-      "the print of the board is stretched: it is {:.2f} +- {:.2f} % {} along its columns than along its rows. This "
-      "was taken into account, with the rows as the measure; measure the print, and print it again without \"fit to "
-      "page\"",
+      "the board's print is stretched: it is {:.2f} +- {:.2f} % {} along its columns than along its rows. slsd "
+      "corrected for it, using the rows' scale; measure the print, and print it again without \"fit to page\"",
       100 * std::abs(rig_.board_stretch), 100 * influence_.sigma(equations_.shared.size() - 1),
       rig_.board_stretch > 0 ? "longer" : "shorter"));
   return warnings;

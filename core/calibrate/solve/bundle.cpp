@@ -255,7 +255,9 @@ Result<Adjusted> adjust(const Observations& observations, const BundleOptions& o
   ceres::Solver::Summary summary;
   ceres::Solve(how, &problem.ceres(), &summary);
   if (!summary.IsSolutionUsable() || !std::isfinite(summary.final_cost)) {
-    return fail(ErrorCode::kImpossible, "the adjustment does not converge: the poses do not determine the rig");
+    return fail(ErrorCode::kImpossible,
+                "the adjustment does not converge, because the poses do not determine the rig: take more poses, at "
+                "more angles and distances");
   }
   return Adjusted{summary.termination_type == ceres::CONVERGENCE, summary.final_cost};
 }
@@ -293,9 +295,10 @@ Result<BundleEquations> linearise(const Observations& observations, const Bundle
     std::vector<double> residuals;
     ceres::CRSMatrix jacobian;
     if (!problem.ceres().Evaluate(what, nullptr, &residuals, nullptr, &jacobian)) {
-      return fail(ErrorCode::kImpossible, "a symbol of " + observations.poses[pose].name +
-                                              " lies where the projector's light misses the board; take that pose "
-                                              "again, or leave it out");
+      return fail(
+          ErrorCode::kImpossible,
+          "a symbol of " + observations.poses[pose].name +
+              " lies where the projector's light cannot reach the board; take that pose again, or leave it out");
     }
     const Eigen::MatrixXd all = dense(jacobian);
     out.by_shared = all.leftCols(columns);

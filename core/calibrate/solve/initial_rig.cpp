@@ -35,8 +35,7 @@ constexpr double kJudgingShare = 0.6, kNearlyBest = 2;
 constexpr double kGrossFactor = 8, kDoubtfulPx = 4, kNoBoardPx = 20;
 /// Smallest angle between the two boards whose tilts differ most.
 constexpr double kTiltsApartMinDeg = 8;
-constexpr char kTilt[] =
-    "hold the board at an angle of 20 to 40 degrees to the camera in most poses, each time towards another side";
+constexpr char kTilt[] = "tilt the board by 20 to 40 degrees to the camera in most poses, each time to another side";
 
 struct CornerLists {
   std::vector<std::vector<cv::Point3f>> board;
@@ -153,14 +152,14 @@ Result<LensVector> estimate_lens(const Observations& observations, std::size_t c
   const Views views = views_of(camera, observations);
   if (views.size() < kPosesMin) {
     return fail(ErrorCode::kImpossible,
-                "only " + std::to_string(views.size()) + " of the poses can be used, and " + std::to_string(kPosesMin) +
-                    " are the least; 10 to 15 make a good calibration",
+                "only " + std::to_string(views.size()) + " of the poses can be used, but at least " +
+                    std::to_string(kPosesMin) + " are needed; 10 to 15 make a good calibration",
                 "camera " + name);
   }
   const double focal = estimate_focal(views, size);
   if (focal == 0) {
     return fail(ErrorCode::kImpossible,
-                std::string("the poses are all parallel, which leaves the focal length open; ") + kTilt,
+                std::string("all poses are parallel, which leaves the focal length undetermined; ") + kTilt,
                 "camera " + name);
   }
   return plain_lens(focal, size);
@@ -197,7 +196,7 @@ Result<> place_cameras(const Observations& observations, const ViewPoses& poses,
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
     if (!placed.contains(camera)) {
       return fail(ErrorCode::kImpossible,
-                  "no pose shows the board to this camera and another one at the same time; show it to both",
+                  "no pose shows the board to this camera and another one at once; show it to both",
                   "camera " + observations.cameras[camera].name);
     }
     rig.cameras[camera].device_from_rig = to_vector(placed[camera]);
@@ -265,11 +264,10 @@ Result<> judge_doubtful(const std::vector<std::size_t>& doubtful, const Observat
     const double error = error_of(observations.poses[i], place);
     rig.rig_from_board.insert(rig.rig_from_board.begin() + static_cast<std::ptrdiff_t>(i), place);
     if (error <= limit_px(usual, kNoBoardPx) || !std::ranges::binary_search(doubtful, i)) continue;
-    initial.faulty.push_back(
-        {i, PoseFault::kUnlike,
-         fmt::format("it contradicts the other poses: its corners are off by {:.0f} px, theirs by {:.2f} px; no camera "
-                     "that saw those can have seen it. Take it again",
-                     error, median_of(usual))});
+    initial.faulty.push_back({i, PoseFault::kUnlike,
+                              fmt::format("it contradicts the other poses: its corners are off by {:.0f} px, theirs by "
+                                          "{:.2f} px, so one camera cannot have taken both. Take it again",
+                                          error, median_of(usual))});
   }
   initial.rig = std::move(rig);
   return {};
@@ -361,7 +359,7 @@ Result<Resection> resect_most(const std::vector<std::vector<SpacePoint>>& poses)
 }  // namespace
 
 FaultyPose fits_no_plane(std::size_t pose) {
-  return {pose, PoseFault::kUnlike, "its corners fit no plane; take it again"};
+  return {pose, PoseFault::kUnlike, "its corners do not fit a plane; take it again"};
 }
 
 Result<InitialRig> estimate_cameras(const Observations& observations) {
@@ -404,9 +402,10 @@ Result<> check_tilts(const RigModel& rig) {
   }
   const double apart_deg = std::acos(std::max(least_cosine, -1.0)) * 180 / std::numbers::pi;
   if (apart_deg >= kTiltsApartMinDeg) return {};
-  return fail(ErrorCode::kImpossible,
-              fmt::format("the poses are all parallel, within {:.1f} degrees, which leaves the focal lengths open; {}",
-                          apart_deg, kTilt));
+  return fail(
+      ErrorCode::kImpossible,
+      fmt::format("all poses are parallel within {:.1f} degrees, which leaves the focal lengths undetermined; {}",
+                  apart_deg, kTilt));
 }
 
 std::optional<MotionVector> estimate_pose(const PoseObservation& pose, const RigModel& rig) {
@@ -429,8 +428,8 @@ Result<std::vector<std::size_t>> estimate_projector(const Observations& observat
   if (!(solved->lens[0] > focal_min && solved->lens[0] < focal_max && solved->lens[1] > focal_min &&
         solved->lens[1] < focal_max)) {
     return fail(ErrorCode::kImpossible,
-                std::string("the poses do not tell the projector's focal length: it came out as ") +
-                    std::to_string(static_cast<long>(solved->lens[0])) + " px; vary the distance too, and " + kTilt);
+                std::string("the poses do not determine the projector's focal length, which came out as ") +
+                    std::to_string(static_cast<long>(solved->lens[0])) + " px; vary the distance, and " + kTilt);
   }
   rig.projector.lens = solved->lens;
   rig.projector.device_from_rig = to_vector(solved->device_from_points);

@@ -241,7 +241,7 @@ Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const Bo
   points.resize((points.size() + step - 1) / step);
   const auto plane = fit_plane(points);
   if (!plane)
-    return fail(ErrorCode::kNotFound, "the cloud has no points on the board: light it, or move it into the light");
+    return fail(ErrorCode::kNotFound, "the cloud has no points on the board: move it into the projector's light");
 
   CloudLook look;
   look.normal = plane->normal;
@@ -263,7 +263,8 @@ Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const Bo
   const auto part_count = static_cast<double>(parts.size());
   if (parts.size() < kPartsMin) {
     return fail(ErrorCode::kNotFound, "the cloud covers too little of the board: " + std::to_string(parts.size()) +
-                                          " of " + std::to_string(kPartsAcross * kPartsDown) + " parts of it");
+                                          " of " + std::to_string(kPartsAcross * kPartsDown) +
+                                          " parts; move it to the middle of the light");
   }
   Eigen::Matrix3d design = Eigen::Matrix3d::Zero();
   double squares = 0;
@@ -278,7 +279,7 @@ Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const Bo
     char text[160];
     std::snprintf(text, sizeof text,
                   "the board is not flat in the cloud: its parts are %.2f mm off a plane (at most %.2f); use a stiff "
-                  "one, or calibrate this scanner anew",
+                  "one, or calibrate this scanner again",
                   look.bend_mm, most_mm);
     return fail(ErrorCode::kMismatch, text);
   }
@@ -304,8 +305,10 @@ Result<PlacedScanners> place_scanners(const Places& places, const std::vector<st
   placed.scanners.resize(scanners);
   for (std::size_t i = 0; i < scanners; ++i) {
     if (!poses[i]) {
-      return fail(ErrorCode::kNotFound, "saw the board at no place together with another that reaches the first",
-                  names[i]);
+      return fail(
+          ErrorCode::kNotFound,
+          "shares no place of the board with the first scanner, directly or through others: show the board to both",
+          names[i]);
     }
     placed.scanners[i].first_from_scanner = *poses[i];
     placed.scanners[i].places = static_cast<std::size_t>(std::ranges::count_if(places, [&](const auto& looks) {

@@ -85,7 +85,7 @@ Result<Eigen::MatrixXd> invert(const Eigen::MatrixXd& normal, const std::vector<
     Eigen::Index worst = 0;
     solver.eigenvectors().col(0).cwiseAbs().maxCoeff(&worst);
     return fail(ErrorCode::kImpossible, "the poses leave " + name_of(names[static_cast<std::size_t>(worst)]) +
-                                            " open; show the board at more angles, distances and places");
+                                            " undetermined; show the board at more angles, distances and places");
   }
   const Eigen::MatrixXd inverse =
       solver.eigenvectors() * values.cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();

@@ -106,7 +106,7 @@ Result<Resection> resect(std::span<const SpacePoint> points) {
   if (points.size() < kPointsMin) {
     return fail(ErrorCode::kImpossible, "only " + std::to_string(points.size()) +
                                             " of the projector's pixels were found on the board; " +
-                                            std::to_string(kPointsMin) + " are the least");
+                                            std::to_string(kPointsMin) + " are needed");
   }
   const Scaling scaling(points);
   std::vector<double> weights(points.size(), 1);
@@ -114,8 +114,9 @@ Result<Resection> resect(std::span<const SpacePoint> points) {
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::SelfAdjointEigenSolver<Normal> solver(normal_equations(points, scaling, weights));
     if (solver.eigenvalues()(1) < kRankTolerance * solver.eigenvalues()(11)) {
-      return fail(ErrorCode::kImpossible,
-                  "all poses lie on one plane, which leaves the projector open; tilt the board and vary its distance");
+      return fail(
+          ErrorCode::kImpossible,
+          "all poses lie on one plane, which leaves the projector undetermined; tilt the board and vary its distance");
     }
     const Eigen::Matrix<double, 12, 1> solution = solver.eigenvectors().col(0);
     projection = Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(solution.data());
@@ -124,7 +125,7 @@ Result<Resection> resect(std::span<const SpacePoint> points) {
   const Resection solved = decompose(scaling.undo(projection));
   if (lie_behind(points, solved.device_from_points)) {
     return fail(ErrorCode::kImpossible,
-                "the projector's picture, or the camera's, is mirrored: turn off rear projection and mirroring");
+                "the projector's or the camera's picture is mirrored: turn off rear projection and mirroring");
   }
   return solved;
 }

@@ -93,11 +93,11 @@ std::vector<std::string> separability_warnings(const Separability& separability,
   for (const SymbolPair& pair : separability.risky_pairs())
     warnings.push_back("symbols " + named(pair.first) + " and " + named(pair.second) + " look alike" + at_size + ": " +
                        one_decimal(pair.distance) + " standard deviations to the boundary, " +
-                       one_decimal(kRiskyDistance) + " wanted; take another pair or a larger size");
+                       one_decimal(kRiskyDistance) + " needed; choose another pair or a larger size");
   for (const SymbolLoss& loss : separability.risky_symbols())
-    warnings.push_back("symbol " + named(loss.number) + " breaks up or grows together with its neighbours" + at_size +
-                       " in " + one_decimal(100 * loss.share) +
-                       " % of views; take another, more spacing or a larger size");
+    warnings.push_back("symbol " + named(loss.number) + " breaks up or merges with its neighbours" + at_size + " in " +
+                       one_decimal(100 * loss.share) +
+                       " % of views; choose another symbol, more spacing or a larger size");
   return warnings;
 }
 

@@ -61,7 +61,7 @@ TEST(ParseBoard, SaysWhatTheFormIs) {
       {"chessboard:9x2000:25", ErrorCode::kInvalidArgument, "3 to 200"},
       {"charuco:11x7:60:60:DICT_5X5_1000", ErrorCode::kInvalidArgument, "smaller than its square"},
       {"charuco:11x7:60:0:DICT_5X5_1000", ErrorCode::kInvalidArgument, "larger than 0"},
-      {"charuco:11x11:60:45:DICT_5X5_50", ErrorCode::kInvalidArgument, "60 markers and DICT_5X5_50 has 50"},
+      {"charuco:11x11:60:45:DICT_5X5_50", ErrorCode::kInvalidArgument, "60 markers, but DICT_5X5_50 has 50"},
       {"circles:4x11:20:29", ErrorCode::kInvalidArgument, "touch"},
   };
   for (const Refusal& refusal : refusals) {

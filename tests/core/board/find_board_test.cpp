@@ -235,7 +235,7 @@ TEST(FindBoard, NamesThePatternWhereAChessboardIsAskedFor) {
   const auto sighting = find_board(frame.view(), *parse_board("chessboard:7x6:50"));
   ASSERT_FALSE(sighting);
   EXPECT_EQ(sighting.error().code, ErrorCode::kMismatch);
-  EXPECT_THAT(sighting.error().message, HasSubstr("not exchanged"));
+  EXPECT_THAT(sighting.error().message, HasSubstr("not swapped"));
 }
 
 }  // namespace

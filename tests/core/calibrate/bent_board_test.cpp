@@ -202,13 +202,13 @@ TEST(BentBoard, IsDoubtfulIfThePosesDoNotTellIt) {
   board.bend_mm = 0.5, board.bend_sigma_mm = 0.4;
   EXPECT_FALSE(board.is_bent());
   EXPECT_FALSE(board.is_known());
-  EXPECT_THAT(board_warnings(board), testing::ElementsAre(testing::HasSubstr("do not tell whether the board is flat")));
+  EXPECT_THAT(board_warnings(board), testing::ElementsAre(testing::HasSubstr("do not show whether the board is flat")));
   board.bend_sigma_mm = 0.05;
   EXPECT_TRUE(board.is_bent());
   EXPECT_THAT(board_text(board), testing::HasSubstr("bent by 0.50 +- 0.05 mm over its 300 mm in all poses alike"));
   EXPECT_THAT(board_warnings(board), testing::IsEmpty());
   board.bend_mm = 2.5;
-  EXPECT_THAT(board_warnings(board), testing::ElementsAre(testing::HasSubstr("so far from flat")));
+  EXPECT_THAT(board_warnings(board), testing::ElementsAre(testing::HasSubstr("may change its shape between poses")));
 }
 
 }  // namespace

@@ -153,7 +153,7 @@ TEST(Calibrate, IsBadWhereNothingOfTheWorkingRangeIsSeen) {
   ASSERT_TRUE(outcome) << outcome.error().message;
   EXPECT_TRUE(outcome->depth.empty());
   EXPECT_EQ(outcome->verdict.grade, Grade::kBad);
-  EXPECT_THAT(outcome->verdict.reasons, testing::ElementsAre(HasSubstr("nowhere in the working range")));
+  EXPECT_THAT(outcome->verdict.reasons, testing::ElementsAre(HasSubstr("share no view in the working range")));
 }
 
 TEST(Calibrate, RefusesParallelPoses) {
@@ -197,7 +197,7 @@ TEST(Calibrate, RefusesOnePose) {
   const auto outcome = calibrate(see(true_rig(), true_poses(1)), {});
   ASSERT_FALSE(outcome);
   EXPECT_EQ(outcome.error().code, ErrorCode::kImpossible);
-  EXPECT_THAT(outcome.error().message, HasSubstr("1 of the poses can be used, and 3 are the least"));
+  EXPECT_THAT(outcome.error().message, HasSubstr("1 of the poses can be used, but at least 3 are needed"));
 }
 
 TEST(Calibrate, SaysWhyTooFewPosesAreLeft) {

@@ -94,9 +94,9 @@ const Mistake kMistakes[] = {
      [](Calibration& rig) { motion(rig).rotation.rightCols<2>() *= -1; }},
     {"ProjectorInOpenGl", "the projector's axes look like OpenGL's",
      [](Calibration& rig) { motion(rig).rotation.bottomRows<2>() *= -1, motion(rig).translation.tail<2>() *= -1; }},
-    {"HalfTheCamera", "camera_matrix looks like that of images of 800x600 px: multiply fx, fy, cx and cy by 2",
+    {"HalfTheCamera", "camera_matrix looks made for images of 800x600 px: multiply fx, fy, cx and cy by 2",
      [](Calibration& rig) { shrink(rig.cameras[0].lens, 0.5); }},
-    {"TwiceTheProjector", "projector_matrix looks like that of images of 2560x1600 px",
+    {"TwiceTheProjector", "projector_matrix looks made for images of 2560x1600 px",
      [](Calibration& rig) { shrink(rig.projector, 2); }},
     {"Swapped", "camera_matrix and projector_matrix look swapped",
      [](Calibration& rig) {
@@ -116,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(CalibrationDoubts, Mistaken, ::testing::ValuesIn(kMista
 TEST(CalibrationDoubts, SaysWhatTheRigCouldMeasure) {
   Calibration rig = rig_of(180, {1, 0, 0}, 1200);
   motion(rig).translation /= 1000;
-  EXPECT_THAT(only_doubt(rig), HasSubstr("are 0.18 mm apart, so from 400 to 2500 mm the light moves by 0.73 px"));
+  EXPECT_THAT(only_doubt(rig), HasSubstr("are 0.18 mm apart; from 400 to 2500 mm the light moves by 0.73 px"));
 }
 
 // ---- further cameras ----
@@ -202,7 +202,7 @@ TEST(SymbolDoubt, TellsWhereTheSymbolsLie) {
   const Calibration rig = rig_of(180, {1, 0, 0}, 1200);
   const std::string doubt = doubt_of(rig, symbols_of(rig, 3000));
   EXPECT_THAT(doubt,
-              HasSubstr("192 symbols of the pattern are read, and the calibration puts most of them from 3030 mm"));
+              HasSubstr("192 symbols of the pattern were read, but the calibration puts most of them from 3030 mm"));
   EXPECT_THAT(doubt, HasSubstr("set depth_min_mm (400) and depth_max_mm (2500)"));
 }
 
@@ -211,7 +211,7 @@ TEST(SymbolDoubt, TellsOfAnotherRig) {
   const std::vector<Match> matches = symbols_of(rig, 900);
   Calibration other = rig;
   motion(other).rotation = Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitX()) * motion(other).rotation;
-  EXPECT_THAT(doubt_of(other, matches), HasSubstr("px off their epipolar lines: it is of another rig"));
+  EXPECT_THAT(doubt_of(other, matches), HasSubstr("px off their epipolar lines: it belongs to another rig"));
 }
 
 TEST(SymbolDoubt, SaysNothingOfAFewSymbols) {

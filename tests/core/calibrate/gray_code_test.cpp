@@ -147,7 +147,7 @@ TEST(ReadGrayCode, RefusesTheCodeOfAnotherProjector) {
   ASSERT_FALSE(points);
   EXPECT_EQ(points.error().code, ErrorCode::kMismatch);
   EXPECT_THAT(points.error().message,
-              testing::HasSubstr("there are 2 images of the Gray code, 40 belong to a projector of 1024x768"));
+              testing::HasSubstr("the Gray code has 2 images, but 40 fit a projector of 1024x768"));
 }
 
 }  // namespace

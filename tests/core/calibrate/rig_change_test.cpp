@@ -66,16 +66,15 @@ TEST(RigChange, NamesTheDeviceAndTheMoment) {
         calibrate(see_change(truth, turned(truth, one.device, one.axis, one.degrees), one.first, 12), {});
     ASSERT_FALSE(outcome) << one.named << " at " << one.first;
     EXPECT_EQ(outcome.error().code, ErrorCode::kImpossible);
-    EXPECT_THAT(outcome.error().message, AllOf(HasSubstr("not one rig"), HasSubstr(one.named),
+    EXPECT_THAT(outcome.error().message, AllOf(HasSubstr("the rig moved during the session"), HasSubstr(one.named),
                                                HasSubstr("between pose_" + std::to_string(one.first - 1) +
                                                          " and pose_" + std::to_string(one.first))));
     // Parts of fewer than three poses are none to calibrate by.
     const auto named = [&](const std::string& part) { return outcome.error().message.find(part) != std::string::npos; };
-    EXPECT_EQ(named("--use pose_" + std::to_string(one.first) + ":pose_11 is the rig as it stands now"),
-              one.first < 10);
-    EXPECT_EQ(named("--use pose_0:pose_" + std::to_string(one.first - 1) + " is the rig as it was before"),
+    EXPECT_EQ(named("--use pose_" + std::to_string(one.first) + ":pose_11 has the rig as it is now"), one.first < 10);
+    EXPECT_EQ(named("--use pose_0:pose_" + std::to_string(one.first - 1) + " has the rig as it was before"),
               one.first > 2);
-    EXPECT_EQ(named("as it stands now there are 2 poses, and 3 are the least"), one.first == 10);
+    EXPECT_EQ(named("only 2 poses show the rig as it is now, but 3 are needed"), one.first == 10);
   }
 }
 
@@ -88,9 +87,9 @@ TEST(RigChange, NamesAMomentOfALargeTurn) {
           const RigModel truth = true_rig();
           const auto outcome = calibrate(see_change(truth, turned(truth, device, axis, degrees), first, 10), {});
           ASSERT_FALSE(outcome) << degrees << " degrees at " << first;
-          EXPECT_THAT(outcome.error().message,
-                      AllOf(HasSubstr("not one rig"), HasSubstr("between pose_" + std::to_string(first - 1) +
-                                                                " and pose_" + std::to_string(first))))
+          EXPECT_THAT(outcome.error().message, AllOf(HasSubstr("the rig moved during the session"),
+                                                     HasSubstr("between pose_" + std::to_string(first - 1) +
+                                                               " and pose_" + std::to_string(first))))
               << degrees << " degrees at " << first;
         }
       }
@@ -121,7 +120,8 @@ TEST(RigChange, OfOnePoseIsNotBlamedOnABoardWhosePrintStayed) {
       ASSERT_TRUE(outcome) << outcome.error().message;
       const PoseReport& alone = report_of(*outcome, first == 1 ? "pose_0" : "pose_11");
       EXPECT_TRUE(alone.fault);
-      EXPECT_EQ(alone.reason.find("the camera or the projector stood otherwise") != std::string::npos, seen_to_stay)
+      EXPECT_EQ(alone.reason.find("the camera or the projector moved since the other poses") != std::string::npos,
+                seen_to_stay)
           << alone.reason;
     }
   }

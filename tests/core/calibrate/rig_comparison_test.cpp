@@ -71,7 +71,7 @@ TEST_F(CompareRigs, TellsACameraThatIsUpsideDown) {
   Calibration before = truth();
   RigidTransform& place = before.cameras[0].projector_from_camera;
   place = place.after(turned(180, Eigen::Vector3d::UnitZ()));
-  EXPECT_THAT(comparison_with(before).change, HasSubstr("the camera is upside down"));
+  EXPECT_THAT(comparison_with(before).change, HasSubstr("about its axis, upside down"));
 }
 
 TEST_F(CompareRigs, TellsAnotherLens) {

@@ -209,10 +209,10 @@ TEST(ReadCalibration, RefusesAFirstCameraThatIsNotTheRig) {
 
 TEST(ReadCalibration, RefusesRubbishWithItsPlace) {
   EXPECT_THAT(message_of(""), HasSubstr("calibration.yml: holds nothing"));
-  EXPECT_THAT(message_of("%YAML:1.0\n---\na: [ 1,\n"), HasSubstr("calibration.yml:4: is no YAML"));
+  EXPECT_THAT(message_of("%YAML:1.0\n---\na: [ 1,\n"), HasSubstr("calibration.yml:4: is not YAML"));
   EXPECT_THAT(message_of("%YAML:1.0\n---\na: [ 1,\n"), HasSubstr("is the file cut short?"));
   EXPECT_THAT(message_of("%YAML:1.0\n---\nprojector_height: 2\ncameras: 3\n"), HasSubstr("projector_width"));
-  EXPECT_THAT(message_of("%YAML:1.0\n" + std::string(2 << 20, '\n')), HasSubstr("above 1 MiB"));
+  EXPECT_THAT(message_of("%YAML:1.0\n" + std::string(2 << 20, '\n')), HasSubstr("exceeds 1 MiB"));
 }
 
 TEST(ReadCalibration, RefusesWithTheLineWhatIsNoYaml) {
@@ -241,7 +241,7 @@ TEST(ReadCalibration, BoundsWhatAHostileFileCosts) {
   EXPECT_THAT(message_of(laughs), HasSubstr("holds too many values"));
   std::string keys = begin;
   for (int i = 0; i < 300; ++i) keys += "k" + std::to_string(i) + ": 1\n";
-  EXPECT_THAT(message_of(keys), HasSubstr("calibration.yml:259: there are too many keys"));
+  EXPECT_THAT(message_of(keys), HasSubstr("calibration.yml:259: has too many keys"));
 }
 
 // ---- other writers ----
@@ -348,8 +348,8 @@ TEST(ReadCalibration, RefusesOtherDistortionsWithWhatToDo) {
     for (int i = 1; i < count; ++i) numbers += ", 0";
     text = replaced(text.replace(data, end - data, numbers), "cols: 5", "cols: " + std::to_string(count), key);
     EXPECT_THAT(message_of(text),
-                HasSubstr("camera_distortion must be 1x5 or 5x1: slsd takes OpenCV's k1 k2 p1 p2 k3"));
-    EXPECT_THAT(message_of(text), HasSubstr("slsd --calibrate makes such"));
+                HasSubstr("camera_distortion must be 1x5 or 5x1: slsd reads OpenCV's k1 k2 p1 p2 k3"));
+    EXPECT_THAT(message_of(text), HasSubstr("slsd --calibrate writes such"));
   }
 }
 
@@ -360,11 +360,11 @@ TEST(ReadCalibration, NamesOtherKindsOfCalibration) {
       {"image_width: 1600\nimage_height: 1200\ncamera_name: left\ndistortion_model: plumb_bob\n",
        "is a camera_info file of ROS"},
       {"cam0:\n  camera_model: pinhole\n  intrinsics: [1, 2, 3, 4]\n", "is a calibration of Kalibr"},
-      {"%YAML:1.0\n---\nM1: 1\nD1: 2\nR: 3\nT: 4\n", "is a calibration of cameras alone"},
-      {"some words\n", "is no calibration file"}};
+      {"%YAML:1.0\n---\nM1: 1\nD1: 2\nR: 3\nT: 4\n", "is a calibration of cameras without a projector"},
+      {"some words\n", "is not a calibration file"}};
   for (const auto& [text, what] : kinds) {
     EXPECT_THAT(message_of(text), HasSubstr(what));
-    EXPECT_THAT(message_of(text), HasSubstr("which slsd --calibrate makes"));
+    EXPECT_THAT(message_of(text), HasSubstr("as slsd --calibrate writes it"));
   }
 }
 
@@ -391,9 +391,9 @@ TEST(ReadCalibration, TakesNamesWithQuotesAndUmlauts) {
 
 TEST(ReadCalibration, RefusesWhatIsNoTree) {
   const std::string begin = "%YAML:1.0\n---\n";
-  EXPECT_THAT(message_of(begin + "a: 1\n   b: 2\n"), HasSubstr("calibration.yml:4: is no YAML"));
-  EXPECT_THAT(message_of(begin + "   a: 1\nb: 2\n"), HasSubstr("calibration.yml:4: is no YAML"));
-  EXPECT_THAT(message_of(begin + "a: 1\na: 2\n"), HasSubstr("calibration.yml:4: a is there twice"));
+  EXPECT_THAT(message_of(begin + "a: 1\n   b: 2\n"), HasSubstr("calibration.yml:4: is not YAML"));
+  EXPECT_THAT(message_of(begin + "   a: 1\nb: 2\n"), HasSubstr("calibration.yml:4: is not YAML"));
+  EXPECT_THAT(message_of(begin + "a: 1\na: 2\n"), HasSubstr("calibration.yml:4: a appears twice"));
   std::string keys, list = "a: [ 1";
   for (int i = 0; i < 50'000; ++i) keys += "a" + std::to_string(i) + ":\n", list += ",\n1";
   EXPECT_THAT(message_of(begin + keys), HasSubstr("too many keys"));
@@ -482,7 +482,7 @@ TEST(DepthSigma, GrowsWithTheSquareOfTheDepthWhereNothingElseIsKnown) {
 TEST(ReadCalibration, RefusesDepthsThatDoNotGrowAndDeviationsBelowNone) {
   Calibration rig = paper_rig();
   rig.report.depth_sigma = {{500, 0.1}, {500, 0.8}, {2000, 3.2}};
-  EXPECT_THAT(message_of(write_calibration(rig)), HasSubstr("depth_mm must grow"));
+  EXPECT_THAT(message_of(write_calibration(rig)), HasSubstr("depth_mm must increase"));
   rig.report.depth_sigma = {{500, 0.1}, {1000, -0.8}, {2000, 3.2}};
   EXPECT_THAT(message_of(write_calibration(rig)), HasSubstr("depth_sigma_mm must not be negative"));
 }

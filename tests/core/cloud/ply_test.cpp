@@ -52,7 +52,7 @@ TEST(ReadPly, RefusesEveryTruncation) {
 TEST(ReadPly, RefusesACellThatIsNone) {
   std::string text = write_ply(any_cloud(3, 4, 4));
   text.back() = '\x80';
-  EXPECT_THAT(to_string(read_ply(text, "cloud.ply").error()), HasSubstr("cloud.ply: names no cell in point"));
+  EXPECT_THAT(to_string(read_ply(text, "cloud.ply").error()), HasSubstr("cloud.ply: has no valid cell in point"));
 }
 
 TEST(ReadPly, RefusesACountThatWouldOverflow) {

@@ -15,7 +15,8 @@ inline int naive_run_difference(const CodeArray& array, int row, int first, int 
   return differing;
 }
 
-/// How far no run of 3 recurs in its row, nor one of 4 but for one letter, nor one of 5 but for two. Slow and plain.
+/// Largest distance within which no run of 3 recurs in its row, nor one of 4 with one other letter, nor one of 5 with
+/// two. Slow and plain.
 inline int naive_row_reach(const CodeArray& array) {
   int reach = array.columns - 3;
   for (int row = 0; row < array.rows; ++row)

@@ -99,7 +99,8 @@ TEST(NoRepeats, NamesTheBoundThatForbidsTheReach) {
 
 TEST(NoRepeats, GivesUpASearchThatFindsNothing) {
   const ArrayOptions wide{.rows = 45, .columns = 72, .letters = 5, .minimum_distance = 3, .row_reach = 60};
-  EXPECT_THAT(why_not(wide), HasSubstr("no run recurs within 60 columns and 0 rows, within the search budget"));
+  EXPECT_THAT(why_not(wide),
+              HasSubstr("without a run that recurs within 60 columns and 0 rows, within the search budget"));
   const ArrayOptions dense{.rows = 90, .columns = 144, .letters = 5, .minimum_distance = 3};
   EXPECT_THAT(why_not(dense), HasSubstr("found no 90x144 array of 5 letters with minimum distance 3 within"));
 }

@@ -130,10 +130,10 @@ TEST(ReadPattern, RefusesRunsThatRecurSoonerThanPromised) {
   EXPECT_THAT(refusal(changed), HasSubstr("recur after"));
   std::string promises_more = text;
   promises_more.replace(text.rfind("column_reach = ") + 15, 2, "19");
-  EXPECT_THAT(refusal(promises_more), HasSubstr("sooner than the file promises"));
+  EXPECT_THAT(refusal(promises_more), HasSubstr("sooner than the file states"));
   std::string asks_more = text;
   asks_more.replace(text.find("column_reach = ") + 15, 2, "19");
-  EXPECT_THAT(refusal(asks_more), HasSubstr("sooner than the file promises"));
+  EXPECT_THAT(refusal(asks_more), HasSubstr("sooner than the file states"));
 }
 
 TEST(ReadPattern, NeedsTheReachOfRunsOnlyWithoutRepeats) {
@@ -147,7 +147,7 @@ TEST(ReadPattern, NeedsTheReachOfRunsOnlyWithoutRepeats) {
 
 TEST(ReadPattern, RefusesRubbish) {
   EXPECT_THAT(refusal(std::string("\x89PNG\r\n\x1a\n\0\0", 10)), HasSubstr("p.toml:1"));
-  EXPECT_THAT(refusal(std::string(2 << 20, '#')), HasSubstr("larger than any pattern file"));
+  EXPECT_THAT(refusal(std::string(2 << 20, '#')), HasSubstr("too large for a pattern file"));
   EXPECT_NE(refusal(std::string(1000, '[')), "read");
 }
 

@@ -97,7 +97,7 @@ TEST(PatternOptions, RefusesWhatIsOutOfRange) {
   EXPECT_THAT(refusal({.symbols = {7}}), HasSubstr("2 to 8 symbols"));
   EXPECT_THAT(refusal({.symbols = {1, 2, 3, 4, 5, 6, 7, 8, 9}}), HasSubstr("2 to 8 symbols"));
   EXPECT_THAT(refusal({.symbols = {7, 26}}), HasSubstr("1 to 25, not 26"));
-  EXPECT_THAT(refusal({.symbols = {7, 22, 7}}), HasSubstr("7 is named twice"));
+  EXPECT_THAT(refusal({.symbols = {7, 22, 7}}), HasSubstr("7 appears twice"));
   EXPECT_THAT(refusal({.minimum_distance = 10}), HasSubstr("1 to 9"));
 }
 

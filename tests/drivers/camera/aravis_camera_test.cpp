@@ -71,7 +71,7 @@ TEST_F(AravisCameraTest, RefusesASettingThatTheCameraDoesNotTake) {
   const auto opened = camera.open();
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::kMismatch);
-  EXPECT_THAT(to_string(opened.error()), HasSubstr("ExposureTime: the camera took 123 where 10000 was set"));
+  EXPECT_THAT(to_string(opened.error()), HasSubstr("ExposureTime: the camera set 123 instead of 10000"));
 }
 
 // Which the double, as many a camera, takes in silence.

@@ -93,7 +93,7 @@ TEST(AssessSeparability, SeesThatNeighboursGrowTogether) {
   const LookOptions dense{.symbol_size_px = 8, .spacing_px = 1, .blur_px = 1.5};
   const Separability separability = assess({7, 3}, dense);
   EXPECT_FALSE(separability.risky_symbols().empty());
-  EXPECT_THAT(separability_warnings(separability, 8).back(), HasSubstr("grows together"));
+  EXPECT_THAT(separability_warnings(separability, 8).back(), HasSubstr("merges with"));
 }
 
 TEST(AssessSeparability, RefusesWhatIsOutOfRange) {
