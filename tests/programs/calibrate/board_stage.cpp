@@ -48,6 +48,7 @@ Grey8 print(const Board& board) {
 
 BoardStage::BoardStage(const Board& board, const ImageSize& projector, std::vector<std::string> cameras)
     : board_(board),
+      half_board_mm_(0.5 * board.width_mm(), 0.5 * board.height_mm()),
       ink_(print(board)),
       projector_(projector),
       cameras_(std::move(cameras)),
@@ -93,9 +94,8 @@ double BoardStage::reflectance(const Eigen::Vector2d& board_mm) const {
   const int x = static_cast<int>(std::floor(board_mm.x() * kInkPerMm)),
             y = static_cast<int>(std::floor(board_mm.y() * kInkPerMm));
   if (ink_.view().contains(x, y)) return ink_.at(x, y) != 0 ? kInk : kPaper;
-  const Eigen::Array2d over = (board_mm - 0.5 * Eigen::Vector2d(board_.width_mm(), board_.height_mm())).array().abs();
-  const bool paper = over.x() < 0.5 * board_.width_mm() + kBorderMm && over.y() < 0.5 * board_.height_mm() + kBorderMm;
-  return paper ? kPaper : kWall;
+  const Eigen::Array2d over = (board_mm - half_board_mm_).array().abs() - half_board_mm_.array();
+  return over.maxCoeff() < kBorderMm ? kPaper : kWall;
 }
 
 /// What is beside the board lies on its plane; where there is none, a wall.

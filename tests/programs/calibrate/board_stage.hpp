@@ -61,6 +61,7 @@ class BoardStage final : public PoseSource {
   [[nodiscard]] const Grey8& look(const std::optional<HeldBoard>& held);
 
   Board board_;
+  Eigen::Vector2d half_board_mm_;
   Grey8 ink_;  ///< of the board, at some pixels to a millimetre
   ImageSize projector_;
   std::vector<std::string> cameras_;
