@@ -142,7 +142,7 @@ class Settings(OnAService):
         self.assertEqual(self.scanner.exposure(), slsd.Exposure("camera", None, None))
         with self.assertRaises(slsd.ScannerError):
             self.scanner.exposure("camera", gain_db=3.0)
-        with self.assertRaisesRegex(slsd.NotFound, "'left' .there are: camera."):
+        with self.assertRaisesRegex(slsd.NotFound, "'left' .configured: camera."):
             self.scanner.exposure("left")
 
     def test_of_a_camera_are_read_back(self):
