@@ -25,7 +25,7 @@ struct Points {
 // The slope along the ray with respect to the pixel follows from (37) by differentiation. It is the solution of the
 // same normal equations with another right-hand side, here `pull`, found in the same way.
 inline __attribute__((always_inline)) void solve_rays(const TriangulationRig& rig, const RayMatches& matches,
-                                                 std::size_t count, Points& points) {
+                                                      std::size_t count, Points& points) {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const auto& [rotation, translation] = rig.projector_from_camera;
   const Eigen::Matrix3d r = rotation;
