@@ -66,6 +66,7 @@ do_test_room() {
   say "all tests of $room passed"
 }
 
+# In CI (CI=true) lint looks at what changed, and sanitizers at text and code of core.
 do_test() {
   if [ $# -gt 0 ]; then
     [ $# -eq 1 ] || refuse
@@ -73,11 +74,17 @@ do_test() {
     return
   fi
   need "${build_packages[@]}" "${test_packages[@]}"
-  if can_check_format; then say "checking the format"; check_format; fi
+  if [ "${CI:-}" = true ]; then
+    do_lint --changed
+  elif can_check_format; then
+    say "checking the format"
+    check_format
+  fi
   build release
   get_aravis_tools release
   get_ros
   run_tests release
+  [ "${CI:-}" != true ] || do_sanitize --core
   say "all tests passed"
 }
 
@@ -89,15 +96,19 @@ quick_passed_over='(/(CameraContract|ProjectorContract)\.|Latency|Soak|Pace|Cali
 
 do_sanitize() {
   need "${test_packages[@]}" "${fuzz_packages[@]}"  # clang needs a third of the time that GCC takes for these builds
-  local preset targets=() choice=()
+  local preset presets=(asan tsan) targets=() choice=()
   case ${1:-} in
     '') ;;
+    --core) presets=(core-asan) ;;
     --quick)
       targets=(quick_tests)  # of tests/CMakeLists.txt
       choice=(--label-regex "$quick_rooms" --tests-regex "$quick_tests" --exclude-regex "$quick_passed_over" --no-tests=error) ;;
     *) refuse ;;
   esac
-  for preset in asan tsan; do build "$preset" ${targets:+"${targets[@]}"}; run_tests "$preset" ${choice:+"${choice[@]}"}; done
+  for preset in "${presets[@]}"; do
+    build "$preset" ${targets:+"${targets[@]}"}
+    run_tests "$preset" ${choice:+"${choice[@]}"}
+  done
 }
 
 do_fuzz() {
