@@ -66,7 +66,7 @@ do_test_room() {
   say "all tests of $room passed"
 }
 
-# In CI (CI=true) lint looks at what changed, and sanitizers at text and code of core.
+# In CI (CI=true) lint looks at what changed, and sanitizers at text, code and geometry of core.
 do_test() {
   if [ $# -gt 0 ]; then
     [ $# -eq 1 ] || refuse
