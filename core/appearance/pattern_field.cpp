@@ -120,14 +120,29 @@ PatternField::PatternField(const ImageView<std::uint8_t>& pattern, float blur_si
   }
 }
 
-const PatternField& PatternFields::at(std::size_t blur) const {
-  std::call_once(made_[blur], [&] { fields_[blur].emplace(pattern_.view(), kBlursPx[blur]); });
-  return *fields_[blur];
+const PatternField& PatternFields::rung(std::size_t rung) const {
+  std::call_once(made_[rung], [&] { fields_[rung].emplace(pattern_.view(), kLadderPx[rung]); });
+  return *fields_[rung];
 }
 
 const PatternField& PatternFields::nearest(float blur_px) const {
   const auto off = [&](float known) { return std::abs(known - blur_px); };
-  return at(static_cast<std::size_t>(std::ranges::min_element(kBlursPx, {}, off) - kBlursPx.begin()));
+  return rung(static_cast<std::size_t>(std::ranges::min_element(kLadderPx, {}, off) - kLadderPx.begin()));
+}
+
+std::shared_ptr<const PatternField> PatternFields::at(float blur_px) const {
+  constexpr float kStepsOfE = 100;
+  const float blur =
+      std::clamp(std::exp(std::round(kStepsOfE * std::log(blur_px)) / kStepsOfE), kBlurMinPx, kBlurMaxPx);
+  const std::lock_guard lock(mutex_);
+  const auto known = std::ranges::find(kept_, blur, [](const auto& field) { return field->blur_sigma_px(); });
+  if (known != kept_.end()) {
+    std::rotate(known, known + 1, kept_.end());
+  } else {
+    if (kept_.size() == kKept) kept_.erase(kept_.begin());
+    kept_.push_back(std::make_shared<const PatternField>(pattern_.view(), blur));
+  }
+  return kept_.back();
 }
 
 }  // namespace slsd

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -26,7 +27,7 @@ class PatternField {
   static constexpr int kBorderPx = 8;  ///< dark border around the pattern
 
   /// @param pattern        the projector's picture; 255 is light 1
-  /// @param blur_sigma_px  standard deviation of a Gaussian, projector px, 0.3 to 2.2
+  /// @param blur_sigma_px  standard deviation of a Gaussian, projector px, 0.3 to 2.8
   PatternField(const ImageView<std::uint8_t>& pattern, float blur_sigma_px);
 
   /// Light at a sample, 0 to 1, and its slopes, per projector px.
@@ -69,20 +70,29 @@ class PatternField {
   std::vector<std::uint32_t> samples_;
 };
 
-/// The pattern at several blurs, each made on first use.
+/// The pattern at any blur. Makes each field on first use: a ladder of blurs that stay, and between them the last few
+/// that were asked for.
 /// @thread thread-safe
 class PatternFields {
  public:
-  static constexpr std::array<float, 7> kBlursPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F};
+  static constexpr float kBlurMinPx = 0.35F, kBlurMaxPx = 2.8F;
+  static constexpr std::array<float, 8> kLadderPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F, 2.8F};
+  static constexpr std::size_t kKept = 6;  ///< number of fields between those of the ladder
+
   explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
-  [[nodiscard]] const PatternField& at(std::size_t blur) const;
-  /// Returns the field with the nearest blur, a standard deviation in projector px.
+  /// Returns a field of the ladder.
+  [[nodiscard]] const PatternField& rung(std::size_t rung) const;
+  /// Returns the field of the ladder with the nearest blur, a standard deviation in projector px.
   [[nodiscard]] const PatternField& nearest(float blur_px) const;
+  /// Returns the field at a blur, rounded to a hundredth of itself.
+  [[nodiscard]] std::shared_ptr<const PatternField> at(float blur_px) const;
 
  private:
   Grey8 pattern_;
-  mutable std::array<std::once_flag, kBlursPx.size()> made_;
-  mutable std::array<std::optional<PatternField>, kBlursPx.size()> fields_;
+  mutable std::array<std::once_flag, kLadderPx.size()> made_;
+  mutable std::array<std::optional<PatternField>, kLadderPx.size()> fields_;
+  mutable std::mutex mutex_;                                       // of kept_
+  mutable std::vector<std::shared_ptr<const PatternField>> kept_;  // the last one asked for comes last
 };
 
 }  // namespace slsd

@@ -20,6 +20,8 @@ constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
 
 /// Number of the sharpest blurs that a projector and a camera in focus reach.
 constexpr int kUsualBlurs = 4;
+/// Rung of the ladder of blurs from which the search starts.
+constexpr std::size_t kUsualRung = 1;
 
 /// Side of a window. It is at least the stride, so that every pixel lies in some node's window.
 int window_px(double pitch_in_camera_px, int stride_px) {
@@ -102,8 +104,8 @@ std::size_t DenseMapper::bytes_of_fields(const Lens& projector) {
   const auto samples = [](int px) {
     return static_cast<std::size_t>(px + 2 * PatternField::kBorderPx) * PatternField::kSamplesPerPx;
   };
-  return PatternFields::kBlursPx.size() * samples(projector.width_px) * samples(projector.height_px) *
-         sizeof(std::uint32_t);
+  return (PatternFields::kLadderPx.size() + PatternFields::kKept) * samples(projector.width_px) *
+         samples(projector.height_px) * sizeof(std::uint32_t);
 }
 
 int DenseMapper::stride_px(const Lens& camera, const DenseOptions& options) {
@@ -117,7 +119,7 @@ int DenseMapper::stride_px(const Lens& camera, const DenseOptions& options) {
 }
 
 void DenseMapper::warm_up(Executor& executor) {
-  executor.run(kUsualBlurs, [&](int blur, int) { (void)fixed_->fields.at(static_cast<std::size_t>(blur)); });
+  executor.run(kUsualBlurs, [&](int blur, int) { (void)fixed_->fields.rung(static_cast<std::size_t>(blur)); });
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
 }
 
@@ -139,29 +141,43 @@ void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
   }
 }
 
-/// Finds the blur that fits best, downhill from that of the previous frame.
-void DenseMapper::find_blur(const DenseFrame& frame) {
-  std::array<float, PatternFields::kBlursPx.size()> misfits;
+/// Finds the blur of the ladder that fits best, downhill from a usual one; among all, if no plane fits at that one.
+const PatternField& DenseMapper::find_rung(const DenseFrame& frame) {
+  const auto& fields = fixed_->fields;
+  std::array<float, PatternFields::kLadderPx.size()> misfits;
   misfits.fill(-1);
-  const auto misfit = [&](std::size_t blur) {
-    if (misfits[blur] < 0) misfits[blur] = grid_.misfit(frame, fixed_->fields.at(blur), seeds_);
-    return misfits[blur];
+  const auto misfit = [&](std::size_t rung) {
+    if (misfits[rung] < 0) misfits[rung] = grid_.misfit(frame, fields.rung(rung), seeds_);
+    return misfits[rung];
   };
-  for (std::size_t from = misfits.size(); from != blur_;) {
-    from = blur_;
-    if (from + 1 < misfits.size() && misfit(from + 1) < misfit(blur_)) blur_ = from + 1;
-    if (from > 0 && misfit(from - 1) < misfit(blur_)) blur_ = from - 1;
+  std::size_t best = kUsualRung;
+  if (misfit(best) >= 1) {
+    for (std::size_t rung = 0; rung < misfits.size(); ++rung)
+      if (misfit(rung) < misfit(best)) best = rung;
   }
+  for (std::size_t from = misfits.size(); from != best;) {
+    from = best;
+    if (from + 1 < misfits.size() && misfit(from + 1) < misfit(best)) best = from + 1;
+    if (from > 0 && misfit(from - 1) < misfit(best)) best = from - 1;
+  }
+  return fields.rung(best);
 }
 
-/// Finds the frame's offset from its epipolar lines, and its blur.
-const PatternField& DenseMapper::find_field(const DenseFrame& frame) {
-  blur_ = 1;
-  // An offset looks like blur, and a wrong blur hides part of the offset. So estimate them in turn, twice.
-  grid_.find_epipolar_offset(frame, fixed_->fields.at(blur_), seeds_);
-  if (!seeds_.empty()) find_blur(frame);
-  grid_.find_epipolar_offset(frame, fixed_->fields.at(blur_), seeds_);
-  return fixed_->fields.at(blur_);
+/// Finds the frame's offset from its epipolar lines, and its blur. An offset looks like blur, and a wrong blur hides
+/// part of the offset. So it estimates them in turn until the blur rests.
+void DenseMapper::find_field(const DenseFrame& frame) {
+  constexpr int kRoundsMost = 6;
+  const PatternFields& fields = fixed_->fields;
+  const auto field_near = [&](const PatternField& field) { return fields.at(grid_.blur_near(frame, field, seeds_)); };
+  const PatternField& usual = fields.rung(kUsualRung);
+  grid_.find_epipolar_offset(frame, usual, seeds_);
+  field_ = field_near(seeds_.empty() ? usual : find_rung(frame));
+  for (int round = 0; round < kRoundsMost; ++round) {
+    grid_.find_epipolar_offset(frame, *field_, seeds_);
+    const auto next = field_near(*field_);
+    if (next == field_) break;
+    field_ = next;
+  }
 }
 
 DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
@@ -175,12 +191,13 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
   followed_ = from ? follower_.followed() : 0, across_px_ = from ? follower_.across_px() : 0;
   if (from) {
-    blur_ = from->blur;
+    field_ = from->pattern_field;
     grid_.set_epipolar_offset(from->epipolar);
   } else {
     grid_.clear();
+    find_field(seen);
   }
-  const PatternField& field = from ? fixed_->fields.at(blur_) : find_field(seen);
+  const PatternField& field = *field_;
   done(DenseStage::kFindBlur);
   grid_.grow(seen, field, seeds_, executor);
   done(DenseStage::kGrow);
@@ -190,7 +207,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
     grid_.grow_on(seen, field, found, executor);
     seeds_.insert(seeds_.end(), found.begin(), found.end());
   }
-  if (next) follower_.keep(seen, field, blur_, grid_, std::span(seeds_).subspan(of_symbols), executor);
+  if (next) follower_.keep(seen, field_, grid_, std::span(seeds_).subspan(of_symbols), executor);
   done(DenseStage::kSearch);
   grid_.fuse(executor);
   done(DenseStage::kFuse);

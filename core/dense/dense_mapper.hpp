@@ -59,7 +59,7 @@ class DenseMapper {
 
   /// Memory in use, without the shared fields: see bytes_of_fields().
   [[nodiscard]] std::size_t bytes() const;
-  /// Largest memory of the pattern's fields, one for each blur.
+  /// Largest memory of the pattern's fields.
   [[nodiscard]] static std::size_t bytes_of_fields(const Lens& projector);
   /// The stride for a frame: dense_stride_px, unless the frame is so large that it would take more than kNodesMost
   /// nodes, some 300 MB.
@@ -78,8 +78,8 @@ class DenseMapper {
   [[nodiscard]] const SurfaceGrid& grid() const { return grid_; }
   /// Number of nodes that the last frame took over from the previous one.
   [[nodiscard]] std::size_t followed_nodes() const { return followed_; }
-  /// Blur of the pattern in the last frame, projector px.
-  [[nodiscard]] float blur_sigma_px() const { return PatternFields::kBlursPx[blur_]; }
+  /// Blur of the pattern in the last frame, projector px; 0 before the first.
+  [[nodiscard]] float blur_sigma_px() const { return field_ ? field_->blur_sigma_px() : 0; }
   /// Offset of the pattern from its epipolar lines at the centre of the last frame, projector px.
   [[nodiscard]] float epipolar_offset_px() const { return grid_.epipolar_offset().middle + across_px_; }
 
@@ -87,8 +87,8 @@ class DenseMapper {
   struct Fixed;
   explicit DenseMapper(std::shared_ptr<const Fixed> fixed);
   void find_seeds(const DecodedSymbols& symbols);
-  void find_blur(const DenseFrame& frame);
-  const PatternField& find_field(const DenseFrame& frame);
+  const PatternField& find_rung(const DenseFrame& frame);
+  void find_field(const DenseFrame& frame);
   DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                     DenseObserver* observer, bool next);
 
@@ -101,7 +101,7 @@ class DenseMapper {
   PixelJudge judge_;
   MapCleaner cleaner_;
   std::vector<SurfaceSeed> seeds_;
-  std::size_t blur_ = 1;
+  std::shared_ptr<const PatternField> field_;  // the pattern as the last frame shows it
   DenseMap map_;
 };
 

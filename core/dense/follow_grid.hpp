@@ -43,8 +43,8 @@ class GridFollower {
 
   /// Keeps a frame, once the grid has grown and before it is fused. It does so if more nodes stand still since the
   /// previous frame than continued. The next frames are then compared with this one.
-  /// @param blur, found  see FollowedFrame
-  void keep(const DenseFrame& frame, const PatternField& field, std::size_t blur, const SurfaceGrid& grid,
+  /// @param field, found  see FollowedFrame
+  void keep(const DenseFrame& frame, const std::shared_ptr<const PatternField>& field, const SurfaceGrid& grid,
             std::span<const SurfaceSeed> found, Executor& executor);
 
   /// Ends the frame: only nodes at which the map has a point continue.

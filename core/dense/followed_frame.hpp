@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "core/appearance/patch_map.hpp"
@@ -17,7 +18,7 @@ namespace slsd {
 struct FollowedFrame {
   std::vector<std::uint16_t> pixels;
   double full = 0;
-  std::size_t blur = 0;  ///< blur of the field that the nodes were aligned with
+  std::shared_ptr<const PatternField> pattern_field;  ///< the field that the nodes were aligned with
   EpipolarOffset epipolar;
   std::vector<SurfaceNode> nodes;                  ///< good if they gave points
   std::vector<char> tried;                         ///< nodes that no plane fitted

@@ -37,7 +37,9 @@ constexpr std::size_t kOffsetSeeds = 256, kOffsetSeedsLeast = 8, kOffsetSlopeSee
 /// Usual offset across the epipolar lines. A larger one suggests an equal error along the lines, which changes depth:
 /// the excess adds to sigma.
 constexpr float kUsualOffsetPx = 0.2F;
-constexpr float kOffsetPx = 0.05F;      // scatter of a seed's offset from relief and noise
+constexpr float kOffsetPx = 0.05F;  // scatter of a seed's offset from relief and noise
+/// Half side of a square that contains any pattern.
+constexpr float kEverywherePx = 1e6F;
 constexpr float kOffsetSlope = 0.001F;  // for one camera px: after a stronger knock, symbols would not decode
 
 }  // namespace
@@ -154,11 +156,29 @@ std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const PatternField&
   return count;
 }
 
-float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
+std::size_t SurfaceGrid::align_sample(const DenseFrame& frame, const PatternField& field,
+                                      std::span<const SurfaceSeed> seeds) {
   const std::size_t step = (seeds.size() + kBatchNodes - 1) / kBatchNodes;
   if (batches_.empty()) batches_.resize(1);
-  Batch& batch = batches_[0];
-  const std::size_t count = align_some(frame, field, seeds, step / 2, step, batch);
+  return align_some(frame, field, seeds, step / 2, step, batches_[0]);
+}
+
+float SurfaceGrid::blur_near(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
+  const std::size_t count = align_sample(frame, field, seeds);
+  blur_meter_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    SurfaceNode node;
+    const PatchTask& task = batches_[0].tasks[i];
+    if (!accept(frame, task, node)) continue;
+    blur_meter_.add(frame.pixels, frame.full, field, kAlign,
+                    {.patch = task, .window_px = options_.window_px, .square_half_px = kEverywherePx});
+  }
+  return changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
+}
+
+float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
+  const std::size_t count = align_sample(frame, field, seeds);
+  const Batch& batch = batches_[0];
   misfits_.clear();
   for (std::size_t i = 0; i < count; ++i) {
     SurfaceNode node;

@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "core/appearance/align_patches.hpp"
+#include "core/appearance/measure_blur.hpp"
 #include "core/executor.hpp"
 #include "core/exposure/frame_noise.hpp"
 #include "core/geometry/calibration.hpp"
@@ -117,6 +118,8 @@ class SurfaceGrid {
 
   /// Misfit of the pattern at a blur to the seeds: the median of residual over gain; 1 if no plane fits.
   [[nodiscard]] float misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
+  /// Blur of the frame at the seeds, projector px, from one near it: see BlurMeter. The field's own if no plane fits.
+  [[nodiscard]] float blur_near(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
 
   /// Measures at some seeds how far the pattern lies off its epipolar lines; later alignments start there.
   void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
@@ -190,6 +193,8 @@ class SurfaceGrid {
   [[nodiscard]] bool accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const;
   std::size_t align_some(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                          std::size_t first, std::size_t step, Batch& batch);
+  /// Aligns a sample of the seeds in the first batch. @return number of tasks that began
+  std::size_t align_sample(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
   void offer(const Attempt& attempt);
   void offer_seeds(std::span<const SurfaceSeed> seeds);
   void grow_fronts(const DenseFrame& frame, const PatternField& field, Executor& executor);
@@ -208,6 +213,7 @@ class SurfaceGrid {
   std::vector<std::uint8_t> attempts_;  // for each node
   std::vector<Batch> batches_;          // one for each worker
   std::vector<float> misfits_;
+  BlurMeter blur_meter_;
   EpipolarOffset epipolar_;
   std::vector<Eigen::Vector3f> offsets_;  // for each seed: camera px, offset
 };

@@ -23,6 +23,10 @@ constexpr float kOfShading = 0.5F;        // factor of the relative change of th
 
 /// Smallest number of symbols from which the frame's blur is measured.
 constexpr std::size_t kBlurSamples = 40;
+/// Ratio to the least misfit at which wider blurs need not be tried.
+constexpr float kFarWorse = 1.5F;
+/// Number of rounds in which the blur comes to rest.
+constexpr int kBlurRoundsMost = 6;
 
 /// The inverse depth of a patch's plane at a camera pixel, given from the patch's centre.
 double inverse_depth(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& at) {
@@ -118,40 +122,47 @@ CellTask SymbolAligner::cell_of(const LatticeSymbol& symbol, const PixelRay& ray
   return cell;
 }
 
-void SymbolAligner::align_with_blur(const GreyView& frame, double full, std::size_t blur,
-                                    std::vector<CellTask>& cells) {
-  align_cells(frame, full, fields_->at(blur), {}, cells);
+/// Aligns a sample of the symbols with a field. @return the median of residual over gain; 1 if most fail
+float SymbolAligner::align_sample(const GreyView& frame, double full, const PatternField& field) {
+  const std::size_t step = std::max<std::size_t>(1, cells_.size() / kBlurSamples);
+  sample_.clear(), misfits_.clear();
+  for (std::size_t i = step / 2; i < cells_.size(); i += step) sample_.push_back(cells_[i]);
+  align_cells(frame, full, field, {}, sample_);
+  for (const CellTask& cell : sample_)
+    misfits_.push_back(cell.patch.failed ? 1 : cell.patch.residual / cell.patch.state.gain);
+  const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
+  std::nth_element(misfits_.begin(), middle, misfits_.end());
+  return *middle;
 }
 
-/// Finds the blur that fits a sample of the symbols best, downhill from the middle of the available blurs.
-std::size_t SymbolAligner::find_blur(const GreyView& frame, double full) {
-  constexpr std::size_t kUnknown = std::numeric_limits<std::size_t>::max();
-  const std::size_t step = std::max<std::size_t>(1, cells_.size() / kBlurSamples);
-  std::array<float, PatternFields::kBlursPx.size()> misfit;
-  misfit.fill(-1);
-  const auto misfit_at = [&](std::size_t blur) {
-    if (misfit[blur] >= 0) return misfit[blur];
-    sample_.clear(), misfits_.clear();
-    for (std::size_t i = step / 2; i < cells_.size(); i += step) sample_.push_back(cells_[i]);
-    align_with_blur(frame, full, blur, sample_);
-    for (const auto& [patch, window_px, middle_px, half_px, covariance] : sample_)
-      misfits_.push_back(patch.failed ? 1 : patch.residual / patch.state.gain);
-    const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
-    std::nth_element(misfits_.begin(), middle, misfits_.end());
-    return misfit[blur] = *middle;
-  };
-  std::size_t best = 1;
-  for (std::size_t from = kUnknown; from != best;) {
-    from = best;
-    if (from + 1 < misfit.size() && misfit_at(from + 1) < misfit_at(best)) best = from + 1;
-    if (from > 0 && misfit_at(from - 1) < misfit_at(best)) best = from - 1;
+/// Finds the pattern as the frame shows it: the best blur of the ladder, and the blur near it that the sample asks for.
+std::shared_ptr<const PatternField> SymbolAligner::find_field(const GreyView& frame, double full) {
+  std::size_t best = 0;
+  float least = std::numeric_limits<float>::max();
+  for (std::size_t rung = 0; rung < PatternFields::kLadderPx.size(); ++rung) {
+    const float misfit = align_sample(frame, full, fields_->rung(rung));
+    if (misfit < least) least = misfit, best = rung;
+    if (misfit > kFarWorse * least) break;
   }
-  return best;
+  const auto field_near = [&](const PatternField& field) {
+    (void)align_sample(frame, full, field);
+    blur_meter_.clear();
+    for (const CellTask& cell : sample_) blur_meter_.add(frame, full, field, {}, cell);
+    return fields_->at(changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0)));
+  };
+  auto field = field_near(fields_->rung(best));
+  for (int round = 0; round < kBlurRoundsMost; ++round) {
+    const auto next = field_near(*field);
+    if (next == field) break;
+    field = next;
+  }
+  return field;
 }
 
 /// Tries the planes of the neighbours as starts. If part of a symbol is cut off, many planes nearly fit the rest; its
 /// neighbours' planes are better starts.
-void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Lattice& lattice, std::size_t blur) {
+void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Lattice& lattice,
+                                   const PatternField& field) {
   const auto is_good = [](const PatchTask& patch) { return !patch.failed && patch.support >= kSupportWeak; };
   again_.clear(), again_for_.clear();
   for (std::size_t i = 0; i < cells_.size(); ++i) {
@@ -166,7 +177,7 @@ void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Lat
       again_.back().patch.state = start;
     }
   }
-  align_with_blur(frame, full, blur, again_);
+  align_cells(frame, full, field, {}, again_);
   for (std::size_t k = 0; k < again_.size(); ++k) {
     CellTask& cell = cells_[again_for_[k]];
     if (!again_[k].patch.failed && again_[k].patch.support > cell.patch.support + 0.005F) cell = again_[k];
@@ -231,9 +242,9 @@ const std::vector<AlignedSymbol>& SymbolAligner::align(const GreyView& frame, do
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i)
     cells_.push_back(cell_of(lattice.symbols[i], rays[i], depths_mm[i], noise));
   if (cells_.empty()) return aligned_;
-  const std::size_t blur = find_blur(frame, full);
-  align_with_blur(frame, full, blur, cells_);
-  try_neighbours(frame, full, lattice, blur);
+  const auto field = find_field(frame, full);
+  align_cells(frame, full, *field, {}, cells_);
+  try_neighbours(frame, full, lattice, *field);
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     const LatticeSymbol& symbol = lattice.symbols[i];
     aligned_.push_back(point_of(lattice, i, rays[i], cells.pixel(symbol.row, symbol.column).cast<float>()));

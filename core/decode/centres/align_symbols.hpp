@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/appearance/align_patches.hpp"
+#include "core/appearance/measure_blur.hpp"
 #include "core/appearance/pattern_field.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/grid/cell_rays.hpp"
@@ -53,9 +54,9 @@ class SymbolAligner {
  private:
   [[nodiscard]] CellTask cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm,
                                  const FrameNoise& noise) const;
-  [[nodiscard]] std::size_t find_blur(const GreyView& frame, double full);
-  void align_with_blur(const GreyView& frame, double full, std::size_t blur, std::vector<CellTask>& cells);
-  void try_neighbours(const GreyView& frame, double full, const Lattice& lattice, std::size_t blur);
+  float align_sample(const GreyView& frame, double full, const PatternField& field);
+  [[nodiscard]] std::shared_ptr<const PatternField> find_field(const GreyView& frame, double full);
+  void try_neighbours(const GreyView& frame, double full, const Lattice& lattice, const PatternField& field);
   [[nodiscard]] AlignedSymbol point_of(const Lattice& lattice, std::size_t index, const PixelRay& ray,
                                        const Eigen::Vector2f& projector_px) const;
   [[nodiscard]] float disagreement_px(const Lattice& lattice, std::size_t index) const;
@@ -69,6 +70,7 @@ class SymbolAligner {
   std::vector<std::size_t> again_for_;  // for each of again_: index of its symbol
   std::vector<AlignedSymbol> aligned_;
   std::vector<float> misfits_;
+  BlurMeter blur_meter_;
 };
 
 }  // namespace slsd

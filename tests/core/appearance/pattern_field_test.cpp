@@ -47,11 +47,11 @@ RC_GTEST_PROP(PatternField, SlopesAreThoseOfItsSamples, ()) {
 
 TEST(PatternFields, FindsTheNearestBlur) {
   const PatternFields fields(blocks());
-  EXPECT_EQ(fields.nearest(0).blur_sigma_px(), PatternFields::kBlursPx.front());
-  EXPECT_EQ(fields.nearest(9).blur_sigma_px(), PatternFields::kBlursPx.back());
+  EXPECT_EQ(fields.nearest(0).blur_sigma_px(), PatternFields::kLadderPx.front());
+  EXPECT_EQ(fields.nearest(9).blur_sigma_px(), PatternFields::kLadderPx.back());
   EXPECT_EQ(fields.nearest(0.8F).blur_sigma_px(), 0.72F);
   EXPECT_EQ(fields.nearest(0.9F).blur_sigma_px(), 0.95F);
-  EXPECT_EQ(&fields.nearest(0.9F), &fields.at(3)) << "made once";
+  EXPECT_EQ(&fields.nearest(0.9F), &fields.rung(3)) << "made once";
 }
 
 TEST(PatternField, IsDarkFarOutside) {

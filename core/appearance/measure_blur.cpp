@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/appearance/measure_blur.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+
+namespace slsd {
+namespace {
+
+using Row = Eigen::Matrix<float, kFitted, 1>;
+
+/// Half the Laplacian of the pattern, from the field's slopes.
+float half_laplacian(const PatternField& field, float u, float v) {
+  constexpr float kOff = 1.F / PatternField::kSamplesPerPx;
+  const float along_u = field.at(u + kOff, v).slope_u - field.at(u - kOff, v).slope_u,
+              along_v = field.at(u, v + kOff).slope_v - field.at(u, v - kOff).slope_v;
+  return 0.5F * (along_u + along_v) / (2 * kOff);
+}
+
+/// Normal equations of a patch, with the change of the blur beside the other unknowns.
+struct Sums {
+  Eigen::Matrix<float, kFitted, kFitted> normal = Eigen::Matrix<float, kFitted, kFitted>::Zero();
+  Row right = Row::Zero(), with_blur = Row::Zero();
+  float blur_blur = 0, blur_right = 0;
+};
+
+template <class T>
+Sums sum_up(const ImageView<T>& frame, double full, const PatternField& field, const AlignOptions& options,
+            const CellTask& task) {
+  const PatchTask& patch = task.patch;
+  const PatchMap& map = patch.map;
+  const PatchState& state = patch.state;
+  const float per_scale = 1 / (options.outlier_sigmas * std::hypot(patch.noise, options.misfit_share * state.gain));
+  const int half = task.window_px / 2;
+  const int left = std::max(-half, -patch.x), right = std::min(half, frame.width - 1 - patch.x),
+            top = std::max(-half, -patch.y), bottom = std::min(half, frame.height - 1 - patch.y);
+  Sums sums;
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x) {
+      const auto level = static_cast<float>(frame.at(patch.x + x, patch.y + y));
+      if (static_cast<double>(level) >= full) continue;
+      const Eigen::Vector2f off(static_cast<float>(x), static_cast<float>(y));
+      const Eigen::Vector2f p = projector_offset(map, state, off) + map.origin_px.cast<float>();
+      if ((p - task.square_middle_px).cwiseAbs().maxCoeff() > task.square_half_px) continue;
+      const PatternField::Sample light = field.at(p.x(), p.y());
+      const float gain = state.gain + state.gain_x * off.x() + state.gain_y * off.y();
+      const float residual = level - state.offset - gain * light.value;
+      const float off_scale = residual * per_scale, agrees = 1 / (1 + off_scale * off_scale), weight = agrees * agrees;
+      const float g = gain * (light.slope_u * map.along.x() + light.slope_v * map.along.y()),
+                  c = gain * (light.slope_v * map.along.x() - light.slope_u * map.along.y()),
+                  by_blur = gain * half_laplacian(field, p.x(), p.y());
+      Row row;
+      row << g, g * off.x(), g * off.y(), c, light.value, light.value * off.x(), light.value * off.y(), 1;
+      sums.normal += weight * row * row.transpose();
+      sums.right += weight * residual * row, sums.with_blur += weight * by_blur * row;
+      sums.blur_blur += weight * by_blur * by_blur, sums.blur_right += weight * by_blur * residual;
+    }
+  }
+  return sums;
+}
+
+}  // namespace
+
+void BlurMeter::add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
+                    const CellTask& task) {
+  if (task.patch.failed || !(task.patch.state.gain > 0)) return;
+  const Sums sums = std::visit([&](const auto& pixels) { return sum_up(pixels, full, field, options, task); }, frame);
+  const Eigen::LDLT<Eigen::Matrix<float, kFitted, kFitted>> others(sums.normal);
+  if (others.info() != Eigen::Success || !others.isPositive()) return;
+  const Row explained = others.solve(sums.with_blur);
+  const float known = sums.blur_blur - sums.with_blur.dot(explained),
+              asked = sums.blur_right - sums.right.dot(explained);
+  if (known > 1e-3F * sums.blur_blur && std::isfinite(asked)) patches_.emplace_back(asked / known, known);
+}
+
+std::optional<float> BlurMeter::change() {
+  if (patches_.empty()) return std::nullopt;
+  std::ranges::sort(patches_);
+  float all = 0, below = 0;
+  for (const auto& [change, weight] : patches_) all += weight;
+  for (const auto& [change, weight] : patches_)
+    if (below += weight; 2 * below >= all) return change;
+  return patches_.back().first;
+}
+
+float changed_blur_px(float blur_px, float change) {
+  const float variance = blur_px * blur_px + change;
+  const float blur = std::sqrt(std::max(0.F, variance));
+  return std::clamp(std::clamp(blur, blur_px / 1.5F, blur_px * 1.5F), PatternFields::kBlurMinPx,
+                    PatternFields::kBlurMaxPx);
+}
+
+}  // namespace slsd

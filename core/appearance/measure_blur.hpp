@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/appearance/align_patches.hpp"
+
+namespace slsd {
+
+/// Measures from aligned patches how much wider or narrower the frame's blur is than the field's. A change s of the
+/// blur's variance changes the pattern by s/2 times its Laplacian (the heat equation). This is one more unknown of the
+/// aligner's equations, the same for all patches, while each has its own place and light.
+/// @thread thread-bound: keeps its buffers
+class BlurMeter {
+ public:
+  void clear() { patches_.clear(); }
+  /// Adds a patch that was aligned with the field.
+  /// @param full  the level of a saturated pixel, which does not count
+  void add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
+           const CellTask& task);
+  /// Change of the variance, projector px^2: the median of the patches, weighted by what each knows. Empty without a
+  /// patch that knows anything.
+  [[nodiscard]] std::optional<float> change();
+
+ private:
+  std::vector<std::pair<float, float>> patches_;  // change, and its weight
+};
+
+/// Standard deviation after a change of the variance: between 2/3 and 3/2 of the old one, for the equations are linear
+/// only nearby, and in PatternFields' range.
+[[nodiscard]] float changed_blur_px(float blur_px, float change);
+
+}  // namespace slsd

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "core/appearance/measure_blur.hpp"
+
+#include <array>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "core/code/pattern.hpp"
+#include "tests/core/appearance/plain_light.hpp"
+#include "tests/core/geometry/paper_rig.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kBlurReach = 16;
+constexpr double kBlurFull = 65535;
+/// Interpolation between a field's samples narrows the pattern, see PatternField. A blur wider by this makes up for it.
+constexpr float kOfSampling = 0.135F;  // projector px
+
+const Grey8& shown_pattern() {
+  static const Grey8 image = draw_pattern(make_pattern({}).value());
+  return image;
+}
+
+/// Places of a plane at 2 m that the paper's rig sees under a blurred pattern.
+struct Patches {
+  Calibration rig = paper_rig();
+  Grey16 frame{1600, 1200};
+  std::vector<CellTask> tasks;
+
+  explicit Patches(double blur_px, double noise = 0) {
+    std::mt19937 random(7);
+    std::normal_distribution<double> gauss(0, noise);
+    const CalibratedCamera& camera = rig.cameras[0];
+    for (int i = 0; i < 8; ++i) {
+      CellTask& task = tasks.emplace_back();
+      task.patch.x = 500 + 61 * i, task.patch.y = 400 + 47 * i;
+      const Eigen::Vector2d centre(task.patch.x, task.patch.y);
+      task.patch.map =
+          make_patch_map(pixel_ray(camera.lens, centre), centre, camera.projector_from_camera, rig.projector, 2000);
+      task.patch.noise = static_cast<float>(std::max(64.0, noise));
+      task.window_px = 2 * kBlurReach + 1, task.square_half_px = 1e6F;
+      for (int y = task.patch.y - kBlurReach; y <= task.patch.y + kBlurReach; ++y) {
+        for (int x = task.patch.x - kBlurReach; x <= task.patch.x + kBlurReach; ++x) {
+          const Eigen::Vector3d ray = camera.lens.undistort({x, y}).homogeneous();
+          const Eigen::Vector2d p = rig.projector.project(camera.projector_from_camera * (2000 * ray));
+          const double light = test::plain_light(shown_pattern(), blur_px, p.x(), p.y());
+          frame.at(x, y) = static_cast<std::uint16_t>(std::lround(2000 + 40000 * light + gauss(random)));
+        }
+      }
+    }
+  }
+
+  /// The blur after some rounds that start at another.
+  [[nodiscard]] float find_from(float blur_px, int rounds) const {
+    BlurMeter meter;
+    for (int round = 0; round < rounds; ++round) {
+      const PatternField field(shown_pattern().view(), blur_px);
+      std::vector<CellTask> aligned = tasks;
+      align_cells(frame.view(), kBlurFull, field, {}, aligned);
+      meter.clear();
+      for (const CellTask& task : aligned) meter.add(frame.view(), kBlurFull, field, {}, task);
+      blur_px = changed_blur_px(blur_px, meter.change().value_or(0));
+    }
+    return blur_px;
+  }
+};
+
+TEST(BlurMeter, FindsTheBlurFromNearby) {
+  for (const float blur_px : {0.45F, 0.6F, 0.83F, 1.1F, 1.5F, 2.F}) {
+    const Patches patches(blur_px);
+    for (const float off : {0.86F, 1.F, 1.16F})
+      EXPECT_NEAR(patches.find_from(off * blur_px, 2), std::hypot(blur_px, kOfSampling), 0.015F * blur_px) << off;
+  }
+}
+
+TEST(BlurMeter, GoesFarInSomeRounds) {
+  EXPECT_NEAR(Patches(1.5).find_from(0.55F, 6), 1.5F, 0.02F);
+  EXPECT_NEAR(Patches(0.5).find_from(1.2F, 6), 0.5F, 0.02F);
+}
+
+TEST(BlurMeter, StandsNoise) {
+  EXPECT_NEAR(Patches(0.8, 1500).find_from(0.72F, 3), 0.8F, 0.04F);
+}
+
+TEST(BlurMeter, KnowsNothingOfWhatFailed) {
+  BlurMeter meter;
+  EXPECT_FALSE(meter.change().has_value());
+  CellTask failed = Patches(0.8).tasks[0];
+  failed.patch.failed = true;
+  meter.add(Grey16(1600, 1200).view(), kBlurFull, PatternField(shown_pattern().view(), 0.8F), {}, failed);
+  EXPECT_FALSE(meter.change().has_value());
+}
+
+TEST(ChangedBlur, StaysNearAndInRange) {
+  EXPECT_FLOAT_EQ(changed_blur_px(1, 0.21F), 1.1F);
+  EXPECT_FLOAT_EQ(changed_blur_px(1, 9), 1.5F);
+  EXPECT_FLOAT_EQ(changed_blur_px(1, -9), 1 / 1.5F);
+  EXPECT_FLOAT_EQ(changed_blur_px(0.4F, -9), PatternFields::kBlurMinPx);
+  EXPECT_FLOAT_EQ(changed_blur_px(2.7F, 9), PatternFields::kBlurMaxPx);
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <Eigen/Geometry>
+
+#include "core/dense/dense_mapper.hpp"
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd::test {
+
+/// The paper's rig with the middle of its camera alone.
+inline Calibration small_rig() {
+  Calibration rig = paper_rig();
+  Lens& lens = rig.cameras[0].lens;
+  lens.width_px = 360, lens.height_px = 280;
+  lens.cx -= 620, lens.cy -= 460;
+  return rig;
+}
+
+inline Pattern small_pattern(std::uint32_t seed = 1) {
+  PatternOptions options;
+  options.symbol_size_px = 8, options.spacing_px = 1;
+  options.symbols = {9, 10, 11, 12, 18, 19};
+  options.seed = seed;
+  options.method = ArrayMethod::kConstructive;
+  return make_pattern(options).value();
+}
+
+inline const Pattern& pattern() {
+  static const Pattern made = small_pattern();
+  return made;
+}
+
+inline const Surface kTilted = plane({0, 0, 2000}, {0.3, 0.15, -1});
+
+struct Seen {
+  Calibration rig;
+  Surface surface;
+  Grey8 frame;
+};
+
+inline Seen see(const Surface& surface, const Grey8& image, const SimulationOptions& options = {}) {
+  const Calibration rig = small_rig();
+  return {rig, surface, simulate(image, rig, surface, options)};
+}
+
+/// A decoder that has seen no frame, without making its constant data again.
+inline Decoder fresh_decoder() {
+  static const Decoder first = Decoder::create(pattern(), small_rig(), 0, {}).value();
+  return first.another();
+}
+
+inline DenseMapper fresh_mapper() {
+  static const DenseMapper first(pattern(), small_rig(), 0, {});
+  return first.another();
+}
+
+struct Measured {
+  std::size_t symbols;
+  DenseMap map;
+};
+
+inline Measured measure(const GreyView& frame, DenseMapper& mapper, double full = 255, Executor* executor = nullptr) {
+  SerialExecutor serial;
+  Decoder decoder = fresh_decoder();
+  const auto decoding = decoder.decode(frame, full);
+  EXPECT_TRUE(decoding);
+  const DecodedSymbols symbols = decoder.symbols();
+  return {symbols.lattice->symbols.size(),
+          mapper.measure(frame, full, symbols, executor != nullptr ? *executor : serial)};
+}
+
+inline Measured measure(const GreyView& frame, double full = 255) {
+  DenseMapper mapper = fresh_mapper();
+  return measure(frame, mapper, full);
+}
+
+inline Measured measure_by(const DenseOptions& options, const GreyView& frame) {
+  DecodeOptions decode;
+  decode.dense = options;
+  DenseMapper mapper(pattern(), small_rig(), 0, decode);
+  return measure(frame, mapper);
+}
+
+struct Score {
+  std::size_t lit = 0, measured = 0, unlit = 0, gross = 0, beyond_three = 0;
+  double median_px = 0, rms_mm = 0, over_sigma = 0;
+};
+
+inline Score score(const DenseMap& map, const Seen& seen) {
+  const Lens& lens = seen.rig.cameras[0].lens;
+  Score score;
+  std::vector<double> px;
+  double squares = 0, squares_sigma = 0;
+  for (int y = 0; y < map.height; ++y) {
+    for (int x = 0; x < map.width; ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
+      const Eigen::Vector3d ray = lens.undistort({x, y}).homogeneous();
+      const bool lit = projector_from_camera({x, y}, seen.rig, seen.surface).has_value();
+      score.lit += lit;
+      if (!map.measured(pixel)) continue;
+      if (!lit) {
+        ++score.unlit;
+        continue;
+      }
+      ++score.measured;
+      const double off = static_cast<double>(map.depth_mm[pixel]) - *seen.surface({Eigen::Vector3d::Zero(), ray});
+      if (std::abs(off) > 5) {
+        ++score.gross;
+        continue;
+      }
+      px.push_back(std::abs(off) / 6.3);
+      squares += off * off;
+      const double over = off / static_cast<double>(map.sigma_mm[pixel]);
+      squares_sigma += over * over;
+      score.beyond_three += std::abs(over) > 3;
+    }
+  }
+  if (px.empty()) return score;
+  std::nth_element(px.begin(), px.begin() + static_cast<std::ptrdiff_t>(px.size() / 2), px.end());
+  score.median_px = px[px.size() / 2];
+  score.rms_mm = std::sqrt(squares / static_cast<double>(px.size()));
+  score.over_sigma = std::sqrt(squares_sigma / static_cast<double>(px.size()));
+  return score;
+}
+
+inline double share(std::size_t part, std::size_t all) {
+  return static_cast<double>(part) / static_cast<double>(std::max<std::size_t>(1, all));
+}
+
+}  // namespace slsd::test
