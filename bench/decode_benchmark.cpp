@@ -9,7 +9,7 @@
 
 #include "bench/benchmarks.hpp"
 #include "core/decode/decoder.hpp"
-#include "daemon/scan/crew.hpp"
+#include "drivers/system/crew.hpp"
 
 namespace slsd {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "bench/benchmarks.hpp"
 #include "core/dense/dense_mapper.hpp"
-#include "daemon/scan/crew.hpp"
+#include "drivers/system/crew.hpp"
 
 namespace slsd {
 namespace {

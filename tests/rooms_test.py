@@ -11,14 +11,13 @@ SOURCE = pathlib.Path(__file__).resolve().parents[1]
 TOPS = ("core", "picture", "drivers", "daemon", "clients", "programs")
 INCLUDE_FOLDERS = (SOURCE, SOURCE / "clients/cpp/include")
 BASE = {"core", "picture", "drivers"}
-PROTOCOL = {"daemon/rpc", "daemon/recording"}  # all that a client knows of the service
+PROTOCOL = {"daemon/rpc"}  # all that a client knows of the service
 BELOW = {
     "core": set(),
     "picture": {"core"},
     "drivers": {"core"},
     "daemon/configuration": BASE,
     "daemon/rpc": BASE,
-    "daemon/recording": BASE,
     "daemon/scan": BASE | {"daemon/configuration"},
     "daemon/server": BASE | {"daemon/configuration", "daemon/scan", "daemon/rpc"},
     "daemon/bundle": BASE | PROTOCOL | {"daemon/configuration", "daemon/scan", "daemon/server"},

@@ -12,7 +12,7 @@
 
 #include "clients/connection/connection.hpp"
 #include "core/result.hpp"
-#include "daemon/recording/layout.hpp"
+#include "drivers/recording/layout.hpp"
 
 namespace slsd {
 

@@ -10,11 +10,11 @@
 #include "core/shown_picture.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/bundle/bundle.hpp"
-#include "daemon/recording/layout.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/scan/frame_image.hpp"
 #include "daemon/server/scan_json.hpp"
 #include "drivers/files/encode_png.hpp"
+#include "drivers/recording/layout.hpp"
 
 namespace slsd {
 namespace {

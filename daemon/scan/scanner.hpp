@@ -14,7 +14,6 @@
 #include "core/result.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/black_box.hpp"
-#include "daemon/scan/bounded_queue.hpp"
 #include "daemon/scan/calibration_watch.hpp"
 #include "daemon/scan/deadlines.hpp"
 #include "daemon/scan/decode_lanes.hpp"
@@ -24,6 +23,7 @@
 #include "daemon/scan/rig.hpp"
 #include "daemon/scan/scan.hpp"
 #include "daemon/scan/scan_statistics.hpp"
+#include "drivers/system/bounded_queue.hpp"
 
 namespace slsd {
 

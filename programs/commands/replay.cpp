@@ -13,10 +13,10 @@
 #include "core/printable.hpp"
 #include "core/shown_picture.hpp"
 #include "daemon/bundle/bundle.hpp"
-#include "daemon/recording/layout.hpp"
 #include "daemon/scan/reconstruct.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"
+#include "drivers/recording/layout.hpp"
 #include "drivers/system/system_error.hpp"
 #include "programs/commands/commands.hpp"
 

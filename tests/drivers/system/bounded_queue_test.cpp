@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/scan/bounded_queue.hpp"
+#include "drivers/system/bounded_queue.hpp"
 
 #include <thread>
 
 #include <gmock/gmock.h>
-
-#include "daemon/scan/heartbeat.hpp"
-#include "daemon/scan/wait_limit.hpp"
 
 namespace slsd {
 namespace {
@@ -39,27 +36,6 @@ TEST(BoundedQueue, PopWaitsForAnotherThread) {
   BoundedQueue<int> queue(1);
   std::jthread pusher([&] { EXPECT_TRUE(queue.try_push(7)); });
   EXPECT_EQ(queue.pop_until(steady_clock::now() + 600s, std::stop_token()), 7);
-}
-
-TEST(Backoff, DoublesUpToTheLongest) {
-  Backoff backoff({.timeout_ms = 1, .exposure_skew_ms = 1, .reopen_first_ms = 10, .reopen_longest_ms = 50});
-  EXPECT_EQ(backoff.next(), 10ms);
-  EXPECT_EQ(backoff.next(), 20ms);
-  EXPECT_EQ(backoff.next(), 40ms);
-  EXPECT_EQ(backoff.next(), 50ms);
-  EXPECT_EQ(backoff.next(), 50ms);
-  backoff.reset();
-  EXPECT_EQ(backoff.next(), 10ms);
-}
-
-TEST(Heartbeat, IsKeptUntilThePromisedTime) {
-  Heartbeat heartbeat;
-  EXPECT_TRUE(heartbeat.kept());
-  heartbeat.promise(60s);
-  EXPECT_TRUE(heartbeat.kept());
-  EXPECT_FALSE(heartbeat.kept(steady_clock::now() + 61s));
-  heartbeat.promise(-1s);
-  EXPECT_FALSE(heartbeat.kept());
 }
 
 }  // namespace

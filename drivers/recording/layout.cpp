@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/recording/layout.hpp"
+#include "drivers/recording/layout.hpp"
 
 #include <algorithm>
 #include <cstdio>

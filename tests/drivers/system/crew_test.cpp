@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/scan/crew.hpp"
+#include "drivers/system/crew.hpp"
 
 #include <atomic>
 #include <chrono>
