@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include <cstdint>
-#include <cstdlib>
 #include <string>
 #include <string_view>
 
@@ -12,6 +11,7 @@
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
 #include "daemon/configuration/server_options.hpp"
+#include "drivers/system/state_folder.hpp"
 
 namespace slsd {
 namespace {
@@ -89,10 +89,8 @@ Result<> ScanOptions::validate() const {
 
 std::filesystem::path BlackBoxOptions::bundles() const {
   if (!folder.empty()) return folder;
-  const char* const state = std::getenv("STATE_DIRECTORY");
-  const std::string_view first =
-      state == nullptr ? "" : std::string_view(state).substr(0, std::string_view(state).find(':'));
-  return first.empty() ? std::filesystem::path() : std::filesystem::path(first) / "bundles";
+  const std::filesystem::path state = state_folder();
+  return state.empty() ? state : state / "bundles";
 }
 
 Result<> BlackBoxOptions::validate() const {

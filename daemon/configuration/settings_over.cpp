@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <optional>
 #include <sstream>
 #include <string_view>
@@ -15,6 +14,7 @@
 
 #include "core/printable.hpp"
 #include "drivers/files/file.hpp"
+#include "drivers/system/state_folder.hpp"
 
 namespace slsd {
 namespace {
@@ -161,12 +161,8 @@ Result<Configuration> load_configuration_with(const path& file, const json& sett
 }
 
 path kept_settings_file(const path& configuration) {
-  const char* const folders = std::getenv("STATE_DIRECTORY");
-  if (folders == nullptr) return {};
-  const std::string first(folders, std::string_view(folders).find_first_of(':') == std::string_view::npos
-                                       ? std::string_view(folders).size()
-                                       : std::string_view(folders).find_first_of(':'));
-  return first.empty() ? path() : path(first) / ("settings-" + configuration.stem().string() + ".json");
+  const path state = state_folder();
+  return state.empty() ? state : state / ("settings-" + configuration.stem().string() + ".json");
 }
 
 Result<json> read_kept_settings(const path& file) {

@@ -5,13 +5,9 @@
 #include <span>
 #include <string_view>
 
-#include <nlohmann/json.hpp>
-
 #include "daemon/configuration/access.hpp"
 #include "daemon/rpc/request.hpp"
-#include "daemon/server/reply.hpp"
-#include "daemon/server/service_state.hpp"
-#include "daemon/server/session.hpp"
+#include "daemon/server/methods_by_kind.hpp"
 
 namespace slsd {
 
@@ -19,7 +15,7 @@ namespace slsd {
 struct RpcMethod {
   std::string_view name;
   Role role;  ///< the role that a client needs
-  void (*run)(ServiceState& state, const nlohmann::json& params, Session& session, Respond respond);
+  RunMethod* run;
   /// Tells whether a request with these parameters changes the light or a scan's outcome. Null: no request does.
   bool (*disturbs)(const nlohmann::json& params) = nullptr;
 };

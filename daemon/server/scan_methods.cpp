@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <chrono>
+#include <optional>
+
+#include <asio/post.hpp>
+
+#include "daemon/rpc/message.hpp"
+#include "daemon/rpc/param_reader.hpp"
+#include "daemon/server/answer.hpp"
+#include "daemon/server/methods_by_kind.hpp"
+#include "daemon/server/scan_json.hpp"
+
+namespace slsd {
+namespace {
+
+using nlohmann::json;
+
+constexpr double kRateMinHz = 0.001;
+constexpr double kRateMaxHz = 1000.0;
+
+// Like carry(); the reply also reports the time from the last byte of its frames to the socket.
+template <class MakeReply>
+Scanner::Answer<ScanResult> carry_scan(ServiceState& state, Respond respond, MakeReply make_reply) {
+  return [&state, respond = std::move(respond), make_reply](const Result<ScanResult>& scan) {
+    auto outcome = std::make_shared<Outcome>(scan ? make_reply(*scan) : tl::unexpected(rpc_error(scan.error())));
+    const MonotonicTime received = scan ? scan->received : MonotonicTime();
+    const bool pictured = scan && !scan->picture_png.empty();
+    asio::post(state.events, [&state, respond, outcome, received, pictured] {
+      if (*outcome) (*outcome)->result["latency_ms"] = latency_ms(received);
+      if (*outcome && !pictured) state.scanner.note_latency(std::chrono::steady_clock::now() - received);
+      respond(std::move(*outcome));
+    });
+  };
+}
+
+// An upper bound of a camera picture's bytes in any coding, known before the capture. 0: no such camera, or its size is
+// unknown because it was not open yet; then the picture is counted when it exists.
+std::size_t picture_bytes(const ServiceState& state, const std::string& camera, std::size_t bytes_a_pixel) {
+  for (const DeviceStatus& each : state.scanner.rig().camera_statuses()) {
+    if (!camera.empty() && each.name != camera) continue;
+    return static_cast<std::size_t>(each.width_px) * static_cast<std::size_t>(each.height_px) * bytes_a_pixel;
+  }
+  return 0;
+}
+
+constexpr std::size_t kFrameBytes = 2;    // per pixel: grey, at full bit depth
+constexpr std::size_t kPictureBytes = 3;  // per pixel: decoded symbols are drawn in colour
+
+// An upper bound of a scan's bytes, without a cloud of symbols: nobody knows its size in advance.
+std::size_t expected_bytes(const ServiceState& state, const ScanRequest& request, CloudForm form = {}) {
+  std::size_t bytes = request.picture ? picture_bytes(state, request.camera, kPictureBytes) : 0;
+  if (form.dense()) {
+    const std::size_t record = form.format == CloudFormat::kPcd ? 21U : 18U;
+    const std::size_t a_pixel = form.format == CloudFormat::kTiff ? 8U : record + (form.normals ? 12U : 0U);
+    for (const DeviceStatus& camera : state.scanner.rig().camera_statuses())
+      bytes += static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * a_pixel;
+  }
+  if (request.frames == FrameCoding::kNone) return bytes;
+  const std::size_t lights = 1 + (request.texture ? 1U : 0U) + (request.ambient ? 1U : 0U);
+  for (const DeviceStatus& camera : state.scanner.rig().camera_statuses()) {
+    bytes +=
+        lights * static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * kFrameBytes;
+  }
+  return bytes;
+}
+
+Outgoing picture_event(const ScanResult& scan) {
+  Outgoing event;
+  event.kind = Outgoing::Kind::kEvent;
+  event.bytes = share(scan.picture_png);
+  event.line = to_line(
+      event_message("picture", {{"scan", scan.cloud.scan_id}, {"format", "png"}, {"bytes", event.bytes->size()}}));
+  return event;
+}
+
+FrameCoding frame_coding(const std::string& name) {
+  if (name == "png") return FrameCoding::kPng;
+  return name == "raw" ? FrameCoding::kRaw : FrameCoding::kNone;
+}
+
+Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameCoding coding) {
+  Outgoing event;
+  event.kind = Outgoing::Kind::kEvent;
+  event.bytes = share(frame.bytes);
+  json params = frame_json(frame);
+  params["scan"] = scan_id;
+  params["light"] = light_name(frame.light);
+  params["format"] = coding == FrameCoding::kPng ? "png" : "raw";
+  params["bytes"] = event.bytes->size();
+  event.line = to_line(event_message("frame", std::move(params)));
+  return event;
+}
+
+// The form of cloud that a request asks for; without a density, the configured one.
+CloudForm read_form(ParamReader& reader, const ServiceState& state) {
+  CloudForm form(cloud_format(reader.choice("format", {"ply", "pcd", "tiff"})));
+  const bool pixels = state.configuration.decode.density == Density::kPixels;
+  const std::string density =
+      pixels ? reader.choice("density", {"pixels", "symbols"}) : reader.choice("density", {"symbols", "pixels"});
+  form.density = density == "pixels" ? Density::kPixels : Density::kSymbols;
+  form.normals = reader.boolean("normals", false);
+  return form;
+}
+
+// Refuses parameters that exclude each other.
+std::optional<RpcError> refused_form(CloudForm form) {
+  const bool tiff = form.format == CloudFormat::kTiff;
+  if (tiff && !form.dense()) return invalid_params("\"tiff\" is a depth map: it needs \"density\": \"pixels\"");
+  if (form.normals && !form.dense()) return invalid_params("\"normals\" need \"density\": \"pixels\"");
+  if (form.normals && tiff) return invalid_params("a depth map (\"tiff\") has no normals: ask for \"ply\" or \"pcd\"");
+  return std::nullopt;
+}
+
+Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameCoding frames, bool why) {
+  Reply reply{scan_json(scan, form.density)};
+  if (why) reply.result["reasons"] = reasons_json(scan);
+  reply.result["format"] = to_string(form.format);
+  CloudFiles files = scan.files;
+  const SharedBytes cloud = files.file(scan.cloud, scan.dense.get(), form);
+  if (as_memfd) {
+    auto memory = sealed_memory(*cloud);
+    if (!memory) return tl::unexpected(rpc_error(memory.error()));
+    reply.result["memfd_bytes"] = cloud->size();
+    reply.memory = std::move(*memory);
+  } else {
+    reply.result["bytes"] = cloud->size();
+    reply.bytes = cloud;
+  }
+  if (!scan.picture_png.empty()) reply.first.push_back(picture_event(scan));
+  for (const FrameImage& frame : scan.frames) reply.first.push_back(frame_event(scan.cloud.scan_id, frame, frames));
+  return reply;
+}
+
+}  // namespace
+
+void run_scan(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const CloudForm form = read_form(reader, state);
+  const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
+  const int timeout_ms = read_timeout(reader, state);
+  const bool picture = reader.boolean("picture", false);
+  const bool why = reader.boolean("why", false);
+  const FrameCoding frames = frame_coding(reader.choice("frames", {"none", "raw", "png"}));
+  const std::string camera = reader.text("camera");
+  const bool texture = reader.boolean("texture", false);
+  const bool ambient = reader.boolean("ambient", false);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
+  const ScanRequest request{deadline_in(timeout_ms),  picture,        camera, frames, texture, ambient,
+                            CloudFormats::only(form), session.gone(), why};
+  if (auto refused = session.reserve(expected_bytes(state, request, form))) return respond(tl::unexpected(*refused));
+  state.scanner.scan(request,
+                     carry_scan(state, std::move(respond), [form, as_memfd, frames, why](const ScanResult& scan) {
+                       return scan_reply(scan, form, as_memfd, frames, why);
+                     }));
+}
+
+void run_preview(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const int timeout_ms = read_timeout(reader, state);
+  const std::string camera = reader.text("camera");
+  const bool why = reader.boolean("why", false);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  ScanRequest request{deadline_in(timeout_ms), true, camera};
+  request.why = why;
+  request.gone = session.gone();
+  if (auto refused = session.reserve(expected_bytes(state, request))) return respond(tl::unexpected(*refused));
+  state.scanner.scan(request, carry_scan(state, std::move(respond), [why](const ScanResult& scan) -> Outcome {
+                       json result = scan_json(scan);
+                       if (why) result["reasons"] = reasons_json(scan);
+                       result["format"] = "png";
+                       return bytes_reply(scan.picture_png, std::move(result));
+                     }));
+}
+
+void run_frame(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const std::string format = reader.choice("format", {"png", "raw"});
+  const int timeout_ms = read_timeout(reader, state);
+  const std::string camera = reader.text("camera");
+  const bool as_shown = reader.boolean("as_shown", false);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  const std::size_t expected = picture_bytes(state, camera, kFrameBytes);
+  if (auto refused = session.reserve(expected)) return respond(tl::unexpected(*refused));
+  state.scanner.frame({deadline_in(timeout_ms), camera, format == "png", as_shown, session.gone()},
+                      carry<FrameImage>(state, std::move(respond), [format](const FrameImage& image) {
+                        json result = frame_json(image);
+                        result["format"] = format;
+                        return bytes_reply(image.bytes, std::move(result));
+                      }));
+}
+
+void run_subscribe(ServiceState& state, const json& params, Session& session, Respond respond) {
+  ParamReader reader(params);
+  const CloudForm form = read_form(reader, state);
+  const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
+  const std::optional<double> rate_hz = reader.number("rate_hz", kRateMinHz, kRateMaxHz);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
+  json result{{"format", to_string(form.format)}};
+  if (form.dense()) result["density"] = to_string(form.density);
+  result["rate_hz"] = rate_hz ? json(*rate_hz) : json();
+  respond(Reply{std::move(result)});
+  session.subscribe(Subscription(form, rate_hz, as_memfd));
+  state.server->update_demand();
+}
+
+void run_unsubscribe(ServiceState& state, const json& params, Session& session, Respond respond) {
+  const ParamReader reader(params);
+  if (auto error = reader.error()) return respond(tl::unexpected(*error));
+  session.unsubscribe();
+  state.server->update_demand();
+  respond(Reply{json::object()});
+}
+
+}  // namespace slsd
