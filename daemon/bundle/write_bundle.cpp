@@ -12,7 +12,7 @@
 #include "daemon/bundle/bundle.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/scan/frame_image.hpp"
-#include "daemon/server/scan_json.hpp"
+#include "daemon/server/methods/scan_json.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/recording/layout.hpp"
 

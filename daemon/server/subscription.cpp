@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "daemon/rpc/message.hpp"
-#include "daemon/server/scan_json.hpp"
+#include "daemon/server/methods/scan_json.hpp"
 
 namespace slsd {
 

@@ -16,9 +16,9 @@
 #include "daemon/scan/devices.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/projected_picture.hpp"
-#include "daemon/server/methods.hpp"
-#include "daemon/server/metrics.hpp"
-#include "daemon/server/status_json.hpp"
+#include "daemon/server/methods/methods.hpp"
+#include "daemon/server/methods/metrics.hpp"
+#include "daemon/server/methods/status_json.hpp"
 #include "daemon/service/logging.hpp"
 #include "drivers/files/file.hpp"
 

@@ -6,8 +6,8 @@
 
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/rpc/param_reader.hpp"
-#include "daemon/server/answer.hpp"
-#include "daemon/server/methods.hpp"
+#include "daemon/server/methods/answer.hpp"
+#include "daemon/server/methods/methods.hpp"
 
 namespace slsd {
 namespace {

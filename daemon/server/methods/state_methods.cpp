@@ -2,11 +2,11 @@
 // Copyright the slsd authors
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/rpc/param_reader.hpp"
-#include "daemon/server/answer.hpp"
-#include "daemon/server/methods_by_kind.hpp"
-#include "daemon/server/metrics.hpp"
-#include "daemon/server/scan_json.hpp"
-#include "daemon/server/status_json.hpp"
+#include "daemon/server/methods/answer.hpp"
+#include "daemon/server/methods/methods_by_kind.hpp"
+#include "daemon/server/methods/metrics.hpp"
+#include "daemon/server/methods/scan_json.hpp"
+#include "daemon/server/methods/status_json.hpp"
 
 namespace slsd {
 namespace {

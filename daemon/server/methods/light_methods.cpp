@@ -9,8 +9,8 @@
 
 #include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/param_reader.hpp"
-#include "daemon/server/answer.hpp"
-#include "daemon/server/methods_by_kind.hpp"
+#include "daemon/server/methods/answer.hpp"
+#include "daemon/server/methods/methods_by_kind.hpp"
 
 namespace slsd {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "daemon/configuration/access.hpp"
 #include "daemon/rpc/request.hpp"
-#include "daemon/server/methods_by_kind.hpp"
+#include "daemon/server/methods/methods_by_kind.hpp"
 
 namespace slsd {
 

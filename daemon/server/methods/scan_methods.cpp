@@ -7,9 +7,9 @@
 
 #include "daemon/rpc/message.hpp"
 #include "daemon/rpc/param_reader.hpp"
-#include "daemon/server/answer.hpp"
-#include "daemon/server/methods_by_kind.hpp"
-#include "daemon/server/scan_json.hpp"
+#include "daemon/server/methods/answer.hpp"
+#include "daemon/server/methods/methods_by_kind.hpp"
+#include "daemon/server/methods/scan_json.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/server/metrics.hpp"
+#include "daemon/server/methods/metrics.hpp"
 
 #include <initializer_list>
 #include <string_view>
@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "daemon/scan/scan_statistics.hpp"
-#include "daemon/server/status_json.hpp"
+#include "daemon/server/methods/status_json.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/server/scan_json.hpp"
+#include "daemon/server/methods/scan_json.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "daemon/rpc/message.hpp"
-#include "daemon/server/counts_json.hpp"
+#include "daemon/server/methods/counts_json.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/server/status_json.hpp"
+#include "daemon/server/methods/status_json.hpp"
 
 #include <unistd.h>
 
@@ -10,7 +10,7 @@
 #include "core/printable.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/scan/scan_statistics.hpp"
-#include "daemon/server/counts_json.hpp"
+#include "daemon/server/methods/counts_json.hpp"
 
 namespace slsd {
 namespace {

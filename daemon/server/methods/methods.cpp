@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/server/methods.hpp"
+#include "daemon/server/methods/methods.hpp"
 
 #include <algorithm>
 #include <array>
