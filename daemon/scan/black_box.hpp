@@ -16,8 +16,8 @@
 #include "core/decode/options.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
-#include "daemon/scan/frame_set.hpp"
-#include "daemon/scan/scan_result.hpp"
+#include "daemon/scan/cloud/scan_result.hpp"
+#include "daemon/scan/rig/frame_set.hpp"
 #include "daemon/scan/scan_setup.hpp"
 
 namespace slsd {

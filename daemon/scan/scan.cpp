@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "daemon/scan/frame_image.hpp"
-#include "daemon/scan/reconstruct.hpp"
+#include "daemon/scan/cloud/frame_image.hpp"
+#include "daemon/scan/cloud/reconstruct.hpp"
 
 namespace slsd {
 namespace {

@@ -7,11 +7,11 @@
 #include <string>
 
 #include "core/result.hpp"
-#include "daemon/scan/decode_lanes.hpp"
-#include "daemon/scan/frame_set.hpp"
-#include "daemon/scan/hardware_guard.hpp"
-#include "daemon/scan/rig.hpp"
-#include "daemon/scan/scan_result.hpp"
+#include "daemon/scan/cloud/decode_lanes.hpp"
+#include "daemon/scan/cloud/scan_result.hpp"
+#include "daemon/scan/rig/frame_set.hpp"
+#include "daemon/scan/rig/hardware_guard.hpp"
+#include "daemon/scan/rig/rig.hpp"
 #include "daemon/scan/scan_setup.hpp"
 #include "daemon/scan/task.hpp"
 

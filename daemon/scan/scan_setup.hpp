@@ -18,8 +18,8 @@
 #include "core/image.hpp"
 #include "core/result.hpp"
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/scan/empty_cloud.hpp"
-#include "daemon/scan/scan_result.hpp"
+#include "daemon/scan/cloud/empty_cloud.hpp"
+#include "daemon/scan/cloud/scan_result.hpp"
 #include "drivers/system/crew.hpp"
 
 namespace slsd {

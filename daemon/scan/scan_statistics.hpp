@@ -11,7 +11,7 @@
 #include <string>
 
 #include "core/result.hpp"
-#include "daemon/scan/scan_result.hpp"
+#include "daemon/scan/cloud/scan_result.hpp"
 
 namespace slsd {
 

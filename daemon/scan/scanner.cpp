@@ -9,9 +9,9 @@
 #include <random>
 
 #include "daemon/configuration/settings_over.hpp"
-#include "daemon/scan/devices.hpp"
 #include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
+#include "daemon/scan/rig/devices.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/system/thread_name.hpp"
 

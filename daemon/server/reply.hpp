@@ -12,7 +12,7 @@
 #include <tl/expected.hpp>
 
 #include "daemon/rpc/message.hpp"
-#include "daemon/scan/cloud_files.hpp"
+#include "daemon/scan/cloud/cloud_files.hpp"
 #include "daemon/server/lent_memory.hpp"
 
 namespace slsd {

@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "daemon/scan/cloud_files.hpp"
+#include "daemon/scan/cloud/cloud_files.hpp"
 #include "daemon/scan/scanner.hpp"
 #include "daemon/server/reply.hpp"
 

@@ -10,7 +10,7 @@
 
 #include "core/calibrate/judge/rig_comparison.hpp"
 #include "core/geometry/triangulate.hpp"
-#include "daemon/scan/hardware.hpp"
+#include "daemon/scan/rig/hardware.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {

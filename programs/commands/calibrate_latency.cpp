@@ -7,7 +7,7 @@
 
 #include "core/utc_text.hpp"
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/scan/devices.hpp"
+#include "daemon/scan/rig/devices.hpp"
 #include "drivers/files/file.hpp"
 #include "programs/commands/commands.hpp"
 #include "programs/latency/latency_file.hpp"

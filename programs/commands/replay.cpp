@@ -13,7 +13,7 @@
 #include "core/printable.hpp"
 #include "core/shown_picture.hpp"
 #include "daemon/bundle/bundle.hpp"
-#include "daemon/scan/reconstruct.hpp"
+#include "daemon/scan/cloud/reconstruct.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"
 #include "drivers/recording/layout.hpp"

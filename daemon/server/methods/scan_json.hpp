@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/scan/scan_result.hpp"
+#include "daemon/scan/cloud/scan_result.hpp"
 
 namespace slsd {
 

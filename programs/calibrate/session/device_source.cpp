@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
-#include "daemon/scan/devices.hpp"
+#include "daemon/scan/rig/devices.hpp"
 
 namespace slsd {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "daemon/configuration/configuration.hpp"
-#include "daemon/scan/rig.hpp"
+#include "daemon/scan/rig/rig.hpp"
 #include "programs/calibrate/session/pose_source.hpp"
 
 namespace slsd {

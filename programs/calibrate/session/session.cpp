@@ -13,7 +13,7 @@
 
 #include "core/calibrate/observe/gray_code.hpp"
 #include "daemon/configuration/settings_over.hpp"
-#include "daemon/scan/hardware.hpp"
+#include "daemon/scan/rig/hardware.hpp"
 #include "drivers/system/interrupt.hpp"
 #include "programs/calibrate/board_request.hpp"
 #include "programs/calibrate/finish_calibration.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "clients/connection/connection.hpp"
-#include "daemon/scan/device_status.hpp"
+#include "daemon/scan/rig/device_status.hpp"
 #include "programs/calibrate/session/pose_source.hpp"
 
 namespace slsd {

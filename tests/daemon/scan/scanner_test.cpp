@@ -9,7 +9,7 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/scan/devices.hpp"
+#include "daemon/scan/rig/devices.hpp"
 #include "tests/daemon/scan/clocked_camera.hpp"
 #include "tests/simulator/simulator.hpp"
 

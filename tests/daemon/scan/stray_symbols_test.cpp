@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/scan/reconstruct.hpp"
+#include "daemon/scan/cloud/reconstruct.hpp"
 
 #include <gtest/gtest.h>
 #include <Eigen/Geometry>
 
-#include "daemon/scan/calibration_watch.hpp"
+#include "daemon/scan/cloud/calibration_watch.hpp"
 #include "drivers/camera/frame_pool.hpp"
 #include "tests/simulator/simulator.hpp"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-// In the place of daemon/scan/devices.cpp: a service whose camera and projector are on a BoardStage, with a person who
-// holds the board in one pose after the other, each until the pattern was shown on it and the sign after that.
-#include "daemon/scan/devices.hpp"
+// In the place of daemon/scan/rig/devices.cpp: a service whose camera and projector are on a BoardStage, with a person
+// who holds the board in one pose after the other, each until the pattern was shown on it and the sign after that.
+#include "daemon/scan/rig/devices.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/cloud/reconstruct.hpp"
+
+#include <algorithm>
+#include <span>
+#include <utility>
+
+#include "core/cloud/shade_points.hpp"
+#include "core/decode/decoder.hpp"
+#include "core/exposure/frame_noise.hpp"
+#include "core/exposure/light_levels.hpp"
+#include "core/geometry/robust.hpp"
+#include "core/utc_text.hpp"
+#include "daemon/scan/cloud/frame_image.hpp"
+
+namespace slsd {
+namespace {
+
+using std::chrono::steady_clock;
+
+constexpr std::size_t kStraysMin = 24;
+
+std::string utc_time(MonotonicTime time) {
+  return utc_text_ms(std::chrono::system_clock::now() - (steady_clock::now() - time));
+}
+
+void append(const Decoding& decoding, std::uint8_t camera, ScanResult& result) {
+  result.cloud.points.insert(result.cloud.points.end(), decoding.points.begin(), decoding.points.end());
+  for (std::size_t i = 0; i < decoding.counts.size(); ++i) result.regions[i] += decoding.counts[i];
+  for (std::size_t i = 0; i < decoding.rules.size(); ++i) result.rules[i] += decoding.rules[i];
+  for (const RegionSeen& region : decoding.regions) {
+    if (region.status == RegionStatus::kDecoded) continue;
+    result.reasons.push_back({region.centre_px.x(), region.centre_px.y(), camera, region.rule, region.guard});
+  }
+}
+
+ScanResult describe(const FrameSet& set, const ScanSetup& setup, const std::string& scan_id) {
+  ScanResult result;
+  result.capture_time = set.capture_time;
+  result.skew = set.skew;
+  result.received = set.received();
+  result.cloud.lattice_columns = setup.pattern.whole_columns();
+  result.cloud.lattice_rows = setup.pattern.whole_rows();
+  result.cloud.cameras = static_cast<int>(setup.calibration->cameras.size());
+  result.cloud.scan_id = scan_id;
+  result.cloud.time = utc_time(set.frames.front().exposure_start());
+  result.cloud.frame = set.frames.front().sequence();
+  return result;
+}
+
+Result<> keep_frames(const std::vector<Frame>& frames, Picture light, const ScanSetup& setup, FrameCoding coding,
+                     ScanResult& result) {
+  for (std::size_t i = 0; coding != FrameCoding::kNone && i < frames.size(); ++i) {
+    auto image = image_of(frames[i], coding, setup.camera_names[i]);
+    if (!image) return tl::unexpected(image.error());
+    image->light = light;
+    result.frames.push_back(std::move(*image));
+  }
+  return {};
+}
+
+Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding coding, ScanResult& result) {
+  auto kept = keep_frames(set.frames, Picture::kPattern, setup, coding, result);
+  if (kept) kept = keep_frames(set.white, Picture::kWhite, setup, coding, result);
+  if (kept) kept = keep_frames(set.dark, Picture::kBlack, setup, coding, result);
+  return kept;
+}
+
+// The saturation level of a camera, for all its frames: a guess from a dark frame alone would be too low.
+double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera) {
+  const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
+  double full = 0;
+  for (const auto* frames : {&set.frames, &set.white, &set.dark}) {
+    if (!frames->empty()) full = std::max(full, full_level(format, (*frames)[camera].image()));
+  }
+  return setup.full_levels->raise(camera, full);
+}
+
+SceneLight light_of(const FrameSet& set, std::size_t camera, double full) {
+  SceneLight light;
+  if (!set.white.empty()) light.white = set.white[camera].image();
+  if (!set.dark.empty()) light.dark = set.dark[camera].image();
+  light.full = full;
+  return light;
+}
+
+// Measures the light of one camera's points.
+void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& result) {
+  if (!light.white && !light.dark) return;
+  const std::size_t saturated = shade_points(points, light);
+  if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
+}
+
+/// A point for each pixel of a camera, from the symbols of its frame.
+DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& setup, std::size_t lane,
+                         std::size_t camera, const SceneLight& light, bool next_of_stream, ScanResult& result) {
+  DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
+  DecodedSymbols symbols = decoder.symbols();
+  if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may come from the quotient image
+  const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
+  DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
+                                 : mapper.measure(frame, light.full, symbols, *setup.crew);
+  DenseView view{std::exchange(map, setup.dense->spare_map()),
+                 mapper.rays(),
+                 calibrated.rig_from_camera,
+                 decoder.camera_index(),
+                 setup.camera_names[camera],
+                 mapper.epipolar_offset_px()};
+  if (light.white || light.dark) {
+    const std::size_t saturated = shade_view(view, light);
+    if (light.white) result.dense_saturated = result.dense_saturated.value_or(0) + saturated;
+  }
+  return view;
+}
+
+// Waits for half of the time left. A stream does not wait: its next cloud carries the answer.
+std::string why_empty(const FrameSet& set, const ScanSetup& setup, std::size_t lane, const ScanRequest& request,
+                      const ScanResult& result) {
+  const auto now = steady_clock::now();
+  const MonotonicTime until = request.of_stream || request.deadline < now ? now : now + (request.deadline - now) / 2;
+  std::vector<std::size_t> cameras;
+  for (const Decoder& decoder : setup.lanes[lane]) cameras.push_back(decoder.camera_index());
+  const ScanBasis basis{setup.pattern, setup.calibration, {setup.depth_min_mm, setup.depth_max_mm}, setup.doubts};
+  return setup.empty_clouds->explain(basis, set, cameras, result, until);
+}
+
+}  // namespace
+
+std::vector<CloudPoint> stray_symbols(const Decoding& decoding, std::uint8_t camera) {
+  if (decoding.off_line.size() < kStraysMin || decoding.off_line.size() < decoding.points.size()) return {};
+  std::vector<CloudPoint> strays;
+  for (const SymbolMatch& match : decoding.off_line) {
+    CloudPoint& stray = strays.emplace_back();
+    const Eigen::Vector2f seen = match.camera_px.cast<float>(), lit = match.projector_px.cast<float>();
+    stray.camera_u = seen.x(), stray.camera_v = seen.y();
+    stray.projector_u = lit.x(), stray.projector_v = lit.y();
+    stray.camera = camera;
+  }
+  return strays;
+}
+
+Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_t lane, const ScanRequest& request,
+                               const std::string& scan_id) {
+  ScanResult result = describe(set, setup, scan_id);
+  const std::size_t pictured = setup.camera_index(request.camera);
+  StageClock clock;
+  const Crew::Turn turn(*setup.crew);
+  auto dense = request.formats.dense() ? setup.dense->cloud() : nullptr;
+  for (std::size_t i = 0; i < set.frames.size(); ++i) {
+    clock.start();
+    const auto begin = steady_clock::now();
+    Decoder& decoder = setup.lanes[lane][i];
+    result.full_levels.push_back(full_level_of(set, setup, i));
+    const SceneLight light = light_of(set, i, result.full_levels.back());
+    const auto decoding = decode_in_light(decoder, set.frames[i].image(), light, &clock, setup.crew.get());
+    result.decode_time += steady_clock::now() - begin;
+    if (!decoding) {
+      return fail(decoding.error().code, decoding.error().message, "camera " + setup.camera_names[i]);
+    }
+    const std::size_t before = result.cloud.points.size();
+    append(**decoding, decoder.camera_index(), result);
+    const std::vector<CloudPoint> strays = stray_symbols(**decoding, decoder.camera_index());
+    result.strays.insert(result.strays.end(), strays.begin(), strays.end());
+    shade(std::span(result.cloud.points).subspan(before), light, result);
+    if (dense) {
+      const auto dense_begin = steady_clock::now();
+      dense->views.push_back(
+          measure_pixels(set.frames[i].image(), decoder, setup, lane, i, light, request.of_stream, result));
+      const auto took = steady_clock::now() - dense_begin;
+      result.dense_time += took, result.decode_time += took;
+    }
+    if (!request.picture || i != pictured) continue;
+    const auto look = request.why ? DecodingLook::kReasons : DecodingLook::kSymbols;
+    auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern, look);
+    if (!picture) return tl::unexpected(picture.error());
+    result.picture_png = std::move(*picture);
+  }
+  if (dense) {
+    dense->scan_id = result.cloud.scan_id, dense->time = result.cloud.time, dense->frame = result.cloud.frame;
+    result.dense = std::move(dense);
+  }
+  result.stage_times = clock.times();
+  if (result.cloud.points.empty()) result.empty = why_empty(set, setup, lane, request, result);
+  if (!result.cloud.points.empty()) {
+    std::vector<double> depths_mm;
+    for (const CloudPoint& point : result.cloud.points) depths_mm.push_back(point.z);
+    const auto sigma_mm = setup.calibration->report.depth_sigma_mm(median_of(std::move(depths_mm)));
+    if (sigma_mm) result.cloud.sigma_calibration_mm = static_cast<float>(*sigma_mm);
+  }
+  if (auto kept = keep_frames(set, setup, request.frames, result); !kept) return tl::unexpected(kept.error());
+  return result;
+}
+
+}  // namespace slsd

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "core/cloud/cloud.hpp"
+#include "core/decode/decoding.hpp"
+#include "daemon/scan/cloud/cloud_files.hpp"
+#include "drivers/camera/camera.hpp"
+#include "drivers/camera/frame.hpp"
+
+namespace slsd {
+
+using StageTimes = std::array<std::chrono::nanoseconds, kStageCount>;
+
+/// Measures the time of each stage of a decode. Adds the times of several frames.
+/// @thread thread-bound
+class StageClock final : public StageObserver {
+ public:
+  void start() { last_ = std::chrono::steady_clock::now(); }
+
+  void stage_done(Stage stage) override {
+    const auto now = std::chrono::steady_clock::now();
+    times_[static_cast<std::size_t>(stage)] += now - last_;
+    last_ = now;
+  }
+
+  [[nodiscard]] const StageTimes& times() const { return times_; }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  StageTimes times_{};
+};
+
+/// The reason why a region gave no point.
+struct RegionReason {
+  float camera_u, camera_v;  ///< the region's centre
+  std::uint8_t camera;       ///< index of the camera in the calibration
+  DecodeRule rule;
+  std::optional<DecodeRule> guard;  ///< the last guard that kept the region from being restored
+};
+
+using RegionCounts = std::array<std::uint32_t, kRegionStatusCount>;
+
+/// The failed tries before a scan's last one: their frames were lost, torn or late.
+struct LostTries {
+  std::uint64_t count = 0;
+  std::vector<Error> last;  ///< the newest few, oldest first
+};
+
+/// The coding of the frames that are kept beside a cloud.
+enum class FrameCoding { kNone, kRaw, kPng };
+
+struct ScanRequest {
+  MonotonicTime deadline;                   ///< end of the wait for devices and frames
+  bool picture = false;                     ///< also draw the decoded symbols in the frame
+  std::string camera;                       ///< the camera of the picture; empty: the first
+  FrameCoding frames = FrameCoding::kNone;  ///< coding of the frames that come with the cloud
+  bool texture = false;                     ///< intensities from frames in white light
+  bool ambient = false;                     ///< minus the intensities under the room's light alone
+  CloudFormats formats = {};                ///< formats for the cloud's files
+  std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
+  bool why = false;                         ///< the picture shows each rejected region in the colour of its rule
+  bool of_stream = false;                   ///< one of a stream: pixels that do not move reuse earlier measurements
+};
+
+/// A request for one frame of one camera.
+struct FrameRequest {
+  MonotonicTime deadline;
+  std::string camera;         ///< empty: the first
+  bool as_png = true;         ///< else raw, row by row
+  bool as_shown = false;      ///< keep the projector's picture; else show the pattern
+  std::stop_token gone = {};  ///< requested when nobody waits for the outcome any more
+};
+
+/// One camera's image as it arrived.
+struct FrameImage {
+  std::string bytes;  ///< a PNG, or pixels row by row, 16 bits little-endian
+  int width_px = 0;
+  int height_px = 0;
+  int bits = 8;
+  std::uint64_t sequence = 0;
+  std::string camera = {};  ///< the camera's name; the times are the Frame's
+  Picture light = Picture::kPattern;
+  MonotonicTime exposure_start = {};
+  MonotonicTime received = {};
+};
+
+/// The outcome of a scan.
+struct ScanResult {
+  Cloud cloud;
+  std::shared_ptr<const DenseCloud> dense = {};  ///< a point per pixel, if requested; shared, as it is large
+  std::string empty = {};                        ///< why no symbol became a point, in words; empty: some did
+  CloudFiles files = {};                         ///< the cloud in the requested formats
+  LostTries lost = {};
+  std::vector<CloudPoint> strays;                     ///< symbols that a knocked rig has displaced: see stray_symbols()
+  RegionCounts regions{};                             ///< regions of all cameras, by status
+  RuleCounts rules{};                                 ///< the same regions, by the rule that decided
+  std::vector<RegionReason> reasons = {};             ///< one for each region that gave no point, of all cameras
+  std::optional<std::uint64_t> saturated;             ///< if requested: points that white was too bright for
+  std::optional<std::uint64_t> dense_saturated = {};  ///< the same for the points of pixels
+  MonotonicTime received;                             ///< time when the last byte of the frames arrived
+  std::chrono::nanoseconds skew{};                    ///< time between the first and the last camera's exposure
+  std::uint64_t skipped = 0;  ///< sets of frames since the previous scan that were skipped for newer ones
+  std::chrono::nanoseconds capture_time{};
+  std::chrono::nanoseconds decode_time{};
+  std::chrono::nanoseconds dense_time{};  ///< the part of decode_time spent on the points of pixels
+  StageTimes stage_times{};
+  std::vector<double> full_levels;  ///< level of a saturated pixel in each camera
+  std::string picture_png;          ///< empty unless asked for
+  std::vector<FrameImage> frames;   ///< if requested: each camera under pattern, then white, then dark
+};
+
+}  // namespace slsd

@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/rig/rig.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+constexpr std::size_t kAlignTriesMax = 32;
+// A driver answers by its deadline. One that does not is cancelled a little later, and then abandoned.
+constexpr auto kLate = 300ms;
+constexpr auto kCancelTime = 400ms;
+constexpr auto kHangUpTime = 1s;  // if nobody waits for the frame any more
+
+std::string milliseconds_text(std::chrono::nanoseconds time) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f ms", std::chrono::duration<double, std::milli>(time).count());
+  return text;
+}
+
+auto exposures(const std::vector<Frame>& frames) {
+  return std::ranges::minmax_element(frames, {}, &Frame::exposure_start);
+}
+
+std::chrono::nanoseconds skew_of(const std::vector<Frame>& frames) {
+  const auto [first, last] = exposures(frames);
+  return last->exposure_start() - first->exposure_start();
+}
+
+// An error of one camera is the error of the set.
+Error incomplete(Error error, std::size_t cameras) {
+  if (cameras > 1 && error.code != ErrorCode::kCancelled) {
+    error.message = "the set of " + std::to_string(cameras) + " frames is incomplete: " + error.message;
+  }
+  return error;
+}
+
+}  // namespace
+
+Rig::Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, Grey8 image,
+         const ScanOptions& options)
+    : projection_(std::move(projector), std::move(image), options), options_(options) {
+  for (auto& camera : cameras) {
+    runners_.push_back(std::make_unique<CameraRunner>(std::move(camera), options));
+    cameras_.push_back(runners_.back().get());
+  }
+}
+
+void Rig::request_stop() {
+  stopping_.request_stop();
+  for (CameraRunner* camera : cameras_) camera->request_stop();
+}
+
+bool Rig::stopped() const {
+  return std::ranges::all_of(cameras_, &CameraRunner::stopped);
+}
+
+bool Rig::kept(MonotonicTime now) const {
+  return std::ranges::all_of(cameras_, [now](const CameraRunner* camera) { return camera->heartbeat().kept(now); });
+}
+
+std::vector<DeviceStatus> Rig::camera_statuses() const {
+  std::vector<DeviceStatus> statuses;
+  for (const CameraRunner* camera : cameras_) statuses.push_back(camera->status());
+  return statuses;
+}
+
+std::uint64_t Rig::openings() const {
+  std::uint64_t openings = projection_.status().opened;
+  for (const CameraRunner* camera : cameras_) openings += camera->openings();
+  return openings;
+}
+
+// Waits for the projection in steps, because the deadline may be far.
+template <class Show>
+Result<> Rig::show(const WaitLimit& limit, Show show) {
+  limit.note("projector");
+  for (;;) {
+    const MonotonicTime end = limit.step(limit.deadline);
+    auto shown = show(end);
+    const bool out_of_time = !shown && shown.error().code == ErrorCode::kTimeout;
+    if (!out_of_time || end >= limit.deadline) return shown;
+    if (stopping_.stop_requested()) return fail(ErrorCode::kCancelled, "the service is stopping");
+  }
+}
+
+Result<> Rig::hold(const std::optional<Grey8>& picture, const WaitLimit& limit) {
+  return show(limit, [&](MonotonicTime end) { return projection_.hold(picture, end, limit.over); });
+}
+
+Result<> Rig::release(const WaitLimit& limit) {
+  return show(limit, [&](MonotonicTime end) { return projection_.release(end, limit.over); });
+}
+
+Result<std::vector<Frame>> Rig::collect(Cameras cameras, const WaitLimit& limit) {
+  for (CameraRunner* camera : cameras) {
+    limit.note("camera " + camera->name());
+    if (!camera->wait_captured(limit, limit.deadline + kLate)) break;
+  }
+  for (CameraRunner* camera : cameras) camera->cancel_capture();
+  const WaitLimit last(steady_clock::now() + (limit.over.stop_requested() ? kHangUpTime : kCancelTime));
+  std::vector<Frame> frames;
+  frames.reserve(cameras.size());
+  Result<> outcome;
+  for (CameraRunner* camera : cameras) {
+    (void)camera->wait_captured(last, last.deadline);
+    auto frame = camera->end_capture();
+    if (frame) {
+      frames.push_back(std::move(*frame));
+    } else if (outcome) {
+      limit.note("camera " + camera->name());
+      outcome = tl::unexpected(incomplete(frame.error(), cameras.size()));
+    }
+  }
+  if (!outcome) return tl::unexpected(outcome.error());
+  return frames;
+}
+
+Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
+  for (CameraRunner* camera : cameras) {
+    shot.limit.note("camera " + camera->name());
+    if (auto ready = camera->wait_ready(shot.limit); !ready) return tl::unexpected(ready.error());
+  }
+  const MonotonicTime since = shot.exposure == Exposure::kNext ? projection_.visible() : steady_clock::now();
+  for (CameraRunner* camera : cameras) camera->begin_capture(shot.limit.deadline, shot.exposure, shot.light);
+  auto frames = collect(cameras, shot.limit);
+  if (!frames) return frames;
+  Result<> outcome = check_times(cameras, *frames, since, shot.limit.deadline);
+  if (outcome) outcome = projection_.check(shot.limit.deadline);
+  if (!outcome) return tl::unexpected(outcome.error());
+  return frames;
+}
+
+Result<std::vector<Frame>> Rig::take_set(const Shot& shot) {
+  const auto shown =
+      show(shot.limit, [&](MonotonicTime end) { return projection_.show(shot.light, end, shot.limit.over); });
+  if (!shown) return tl::unexpected(shown.error());
+  const bool going_on = std::exchange(changes_before_, projection_.changes()) == projection_.changes();
+  auto frames = expose(cameras_, {shot.limit, going_on ? shot.exposure : Exposure::kFresh, shot.light});
+  if (!frames) return frames;
+  if (auto aligned = align(*frames, shot); !aligned) return tl::unexpected(aligned.error());
+  if (auto together = check_skew(*frames); !together) return tl::unexpected(together.error());
+  return frames;
+}
+
+bool Rig::only_replays() const {
+  return std::ranges::all_of(cameras_, [](const auto& camera) { return camera->replays() && camera->rate_hz() <= 0; });
+}
+
+Result<FrameSet> Rig::capture(const WaitLimit& limit, Exposure exposure, LightFrames light) {
+  const auto begin = steady_clock::now();
+  FrameSet set;
+  for (const Picture now : {Picture::kPattern, Picture::kWhite, Picture::kBlack}) {
+    if (now == Picture::kWhite && !light.white) continue;
+    if (now == Picture::kBlack && !light.dark) continue;
+    auto frames = take_set({limit, exposure, now});
+    while (!frames && limit.again && limit.again(frames.error())) {
+      frames = take_set({limit, Exposure::kFresh, now});
+    }
+    if (!frames) return tl::unexpected(frames.error());
+    (now == Picture::kPattern ? set.frames : now == Picture::kWhite ? set.white : set.dark) = std::move(*frames);
+  }
+  set.capture_time = steady_clock::now() - begin;
+  set.skew = skew_of(set.frames);
+  return set;
+}
+
+Result<Frame> Rig::capture_one(std::size_t camera, const WaitLimit& limit, bool as_shown) {
+  for (;;) {
+    const auto shown = show(limit, [&](MonotonicTime end) {
+      return as_shown ? projection_.show_due(end, limit.over) : projection_.show(Picture::kPattern, end, limit.over);
+    });
+    if (!shown) return tl::unexpected(shown.error());
+    auto frames = expose(Cameras(cameras_).subspan(camera, 1), {limit});
+    if (frames) return std::move(frames->front());
+    if (!limit.again || !limit.again(frames.error())) return tl::unexpected(frames.error());
+  }
+}
+
+// Cameras in free run begin at any moment of their period. If one began too early for the others, its next frame is
+// closer to theirs.
+Result<> Rig::align(std::vector<Frame>& frames, const Shot& shot) {
+  for (std::size_t tries = 0; frames.size() > 1 && tries < kAlignTriesMax; ++tries) {
+    const auto first = static_cast<std::size_t>(exposures(frames).min - frames.begin());
+    if (skew_of(frames) <= slack(*cameras_[first])) return {};
+    auto next = expose(Cameras(cameras_).subspan(first, 1), {shot.limit, Exposure::kNext, shot.light});
+    if (!next) return tl::unexpected(next.error());
+    frames[first] = std::move(next->front());
+  }
+  return {};
+}
+
+/// The longest time by which this camera may begin before the last of the others while no later frame of it is closer.
+std::chrono::nanoseconds Rig::slack(const CameraRunner& camera) const {
+  if (camera.rate_hz() <= 0) return std::chrono::nanoseconds::max();
+  return std::chrono::nanoseconds(static_cast<std::int64_t>(0.5e9 / camera.rate_hz()));
+}
+
+Result<> Rig::check_times(Cameras cameras, const std::vector<Frame>& frames, MonotonicTime since,
+                          MonotonicTime deadline) const {
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].exposure_start() < since) {
+      return fail(ErrorCode::kFrameStale, "the frame was exposed before the scan's trigger: scan again",
+                  "camera " + cameras[i]->name());
+    }
+    if (frames[i].received() > deadline) {
+      return fail(ErrorCode::kFrameLate, "the frame came after the deadline: allow a longer timeout",
+                  "camera " + cameras[i]->name());
+    }
+  }
+  return {};
+}
+
+Result<> Rig::check_skew(const std::vector<Frame>& frames) const {
+  const auto skew = skew_of(frames);
+  if (skew <= std::chrono::milliseconds(options_.exposure_skew_ms)) return {};
+  const auto [first, last] = exposures(frames);
+  return fail(ErrorCode::kFrameSkewed, "camera " + cameras_[last - frames.begin()]->name() + " exposed " +
+                                           milliseconds_text(skew) + " after camera " +
+                                           cameras_[first - frames.begin()]->name() +
+                                           ", more than [scan] exposure_skew_ms: check the trigger");
+}
+
+}  // namespace slsd

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/cloud/decode_lanes.hpp"
+
+#include <atomic>
+#include <future>
+#include <random>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+namespace slsd {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::steady_clock;
+
+/// A job of a number that notes when it was delivered, and whether it had been computed.
+class NumberJob final : public FrameJob {
+ public:
+  struct Delivered {
+    int number;
+    bool computed;
+    friend bool operator==(const Delivered&, const Delivered&) = default;
+  };
+  using Log = std::vector<Delivered>;
+
+  NumberJob(int number, Log& log, std::function<void()> work = {})
+      : delivered_{number, false}, log_(log), work_(std::move(work)) {}
+  void compute(std::size_t) override {
+    if (work_) work_();
+    delivered_.computed = true;
+  }
+  void deliver() override { log_.push_back(delivered_); }
+
+ private:
+  Delivered delivered_;
+  Log& log_;
+  std::function<void()> work_;
+};
+
+/// Work that ends when the gate is opened, and tells that it has begun.
+struct Gate {
+  std::promise<void> opened;
+  std::shared_future<void> open = opened.get_future().share();
+  std::atomic<int> inside{0};
+
+  std::function<void()> work() {
+    return [this] {
+      ++inside;
+      open.wait();
+    };
+  }
+  void wait_inside(int count) const {
+    while (inside < count) std::this_thread::yield();
+  }
+};
+
+void wait_for(DecodeLanes& lanes, std::uint64_t done) {
+  while (lanes.done() < done) std::this_thread::sleep_for(1ms);
+}
+
+TEST(DecodeLanes, DeliverInTheOrderOfArrivalWhicheverLaneIsQuicker) {
+  constexpr int kJobs = 200;
+  NumberJob::Log log;
+  DecodeLanes lanes(2);
+  std::minstd_rand random(7);
+  for (int i = 0; i < kJobs; ++i) {
+    const auto time = std::chrono::microseconds(random() % 300);
+    lanes.push(std::make_unique<NumberJob>(i, log, [time] { std::this_thread::sleep_for(time); }));
+  }
+  wait_for(lanes, kJobs);
+  ASSERT_EQ(log.size(), kJobs);
+  for (int i = 0; i < kJobs; ++i) EXPECT_EQ(log[static_cast<std::size_t>(i)], (NumberJob::Delivered{i, true}));
+  EXPECT_EQ(lanes.skipped(), 0U);
+}
+
+TEST(DecodeLanes, NewestOfferedWinsAndThoseSkippedAreCounted) {
+  NumberJob::Log log;
+  Gate gate;
+  DecodeLanes lanes(1);
+  lanes.offer(std::make_unique<NumberJob>(0, log, gate.work()));
+  gate.wait_inside(1);
+  const auto now = steady_clock::now();
+  for (int i = 1; i <= 5; ++i) lanes.offer(std::make_unique<NumberJob>(i, log), now);
+  EXPECT_EQ(lanes.skipped(), 2U);
+  gate.opened.set_value();
+  wait_for(lanes, 6);
+  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{3, true},
+                                          NumberJob::Delivered{4, true}, NumberJob::Delivered{5, true}));
+}
+
+TEST(DecodeLanes, WhatHasWaitedForTooLongMakesRoom) {
+  NumberJob::Log log;
+  Gate gate;
+  DecodeLanes lanes(1);
+  lanes.offer(std::make_unique<NumberJob>(0, log, gate.work()));
+  gate.wait_inside(1);
+  auto now = steady_clock::now();
+  for (int i = 1; i <= 3; ++i) lanes.offer(std::make_unique<NumberJob>(i, log), now += DecodeLanes::kTurn + 1ms);
+  EXPECT_EQ(lanes.skipped(), 2U);
+  gate.opened.set_value();
+  wait_for(lanes, 4);
+  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{3, true}));
+}
+
+TEST(DecodeLanes, WhatWasPushedIsNeverSkipped) {
+  NumberJob::Log log;
+  Gate gate;
+  DecodeLanes lanes(1);
+  lanes.push(std::make_unique<NumberJob>(0, log, gate.work()));
+  gate.wait_inside(1);
+  lanes.push(std::make_unique<NumberJob>(1, log));
+  const auto now = steady_clock::now();
+  for (int i = 2; i <= 4; ++i) lanes.offer(std::make_unique<NumberJob>(i, log), now + i * DecodeLanes::kTurn * 2);
+  EXPECT_EQ(lanes.skipped(), 2U);
+  gate.opened.set_value();
+  wait_for(lanes, 5);
+  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{1, true},
+                                          NumberJob::Delivered{4, true}));
+}
+
+TEST(DecodeLanes, StopDeliversWhatWasNotComputed) {
+  NumberJob::Log log;
+  Gate gate;
+  DecodeLanes lanes(1);
+  lanes.push(std::make_unique<NumberJob>(0, log, gate.work()));
+  gate.wait_inside(1);
+  lanes.push(std::make_unique<NumberJob>(1, log));
+  lanes.request_stop();
+  EXPECT_FALSE(lanes.stopped());
+  gate.opened.set_value();
+  while (!lanes.stopped()) std::this_thread::sleep_for(1ms);
+  lanes.push(std::make_unique<NumberJob>(2, log));
+  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{1, false},
+                                          NumberJob::Delivered{2, false}));
+}
+
+TEST(DecodeLanes, WaitDoneEndsWithAJobTheTimeOrNothingUnderWay) {
+  NumberJob::Log log;
+  Gate gate;
+  DecodeLanes lanes(2);
+  EXPECT_FALSE(lanes.wait_done(0, steady_clock::now() + 600s));
+  lanes.push(std::make_unique<NumberJob>(0, log, gate.work()));
+  EXPECT_FALSE(lanes.wait_done(0, steady_clock::now()));
+  gate.opened.set_value();
+  EXPECT_TRUE(lanes.wait_done(0, steady_clock::now() + 600s));
+}
+
+}  // namespace
+}  // namespace slsd

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "daemon/scan/cloud/reconstruct.hpp"
+
+#include <algorithm>
+
+#include <gmock/gmock.h>
+
+#include "drivers/camera/frame_pool.hpp"
+#include "tests/core/decode/images.hpp"
+#include "tests/simulator/simulator.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr int kRoomLight = 20;
+
+std::vector<Frame> frame_of(const GreyView& image) {
+  FramePool pool(format_of(image), 1);
+  std::vector<Frame> frames;
+  frames.push_back(std::move(*pool.lend(image, 1, std::chrono::steady_clock::now())));
+  return frames;
+}
+
+/// The cloud of a plane in a lit room, with the room's light told by a frame under a black projector.
+std::vector<CloudPoint> scan(const Pattern& pattern, const std::string& format, const GreyView& lit,
+                             const GreyView& dark) {
+  ScanSetup setup{pattern, draw_pattern(pattern), paper_rig(), {"camera"}, {}};
+  setup.camera_formats = {format};
+  setup.lanes.emplace_back().push_back(std::move(*Decoder::create(pattern, paper_rig(), 0, {})));
+  FrameSet set;
+  set.frames = frame_of(lit);
+  set.dark = frame_of(dark);
+  const auto result = reconstruct(set, setup, 0, {}, "scan");
+  EXPECT_TRUE(result);
+  return result->cloud.points;
+}
+
+// A dark frame alone would be taken for one of fewer bits than the pattern's.
+TEST(Reconstruct, TakesTheRoomsLightFromIntensitiesAtEveryDepth) {
+  const Pattern pattern = *make_pattern({});
+  const Grey8 lit = simulate(draw_pattern(pattern), paper_rig(), plane({0, 0, 2000}, {0, 0, 1}), {.dark = kRoomLight});
+  const Grey8 dark(lit.width(), lit.height(), kRoomLight);
+  const std::vector<CloudPoint> eight = scan(pattern, "Mono8", lit.view(), dark.view());
+  ASSERT_GT(eight.size(), 1000U);
+  for (const int bits : {10, 12, 14, 16}) {
+    const double full = (1 << bits) - 1;
+    for (const std::string& format : {"Mono" + std::to_string(bits), std::string()}) {
+      const auto wide = scan(pattern, format, deep(lit, full).view(), deep(dark, full).view());
+      ASSERT_NEAR(static_cast<double>(wide.size()), static_cast<double>(eight.size()), 3) << bits << format;
+      std::vector<int> before, after;
+      for (const CloudPoint& point : eight) before.push_back(point.intensity);
+      for (const CloudPoint& point : wide) after.push_back(point.intensity);
+      std::ranges::sort(before), std::ranges::sort(after);
+      EXPECT_NEAR(after[after.size() / 2], before[before.size() / 2], 1) << bits << format;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace slsd
