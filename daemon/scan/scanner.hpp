@@ -17,13 +17,13 @@
 #include "daemon/scan/cloud/calibration_watch.hpp"
 #include "daemon/scan/cloud/decode_lanes.hpp"
 #include "daemon/scan/deadlines.hpp"
-#include "daemon/scan/heartbeat.hpp"
 #include "daemon/scan/rig/hardware_guard.hpp"
 #include "daemon/scan/rig/projected_picture.hpp"
 #include "daemon/scan/rig/rig.hpp"
 #include "daemon/scan/scan.hpp"
 #include "daemon/scan/scan_statistics.hpp"
 #include "drivers/system/bounded_queue.hpp"
+#include "drivers/system/heartbeat.hpp"
 
 namespace slsd {
 

@@ -13,9 +13,9 @@
 #include <stop_token>
 #include <thread>
 
-#include "daemon/scan/heartbeat.hpp"
 #include "daemon/scan/wait_limit.hpp"
 #include "drivers/camera/frame.hpp"
+#include "drivers/system/heartbeat.hpp"
 
 namespace slsd {
 

@@ -14,10 +14,10 @@
 #include <thread>
 
 #include "core/result.hpp"
-#include "daemon/scan/heartbeat.hpp"
 #include "daemon/scan/rig/device_status.hpp"
 #include "daemon/scan/wait_limit.hpp"
 #include "drivers/camera/camera.hpp"
+#include "drivers/system/heartbeat.hpp"
 
 namespace slsd {
 

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/scan/heartbeat.hpp"
+#include "drivers/system/heartbeat.hpp"
 
 namespace slsd {
 namespace {
