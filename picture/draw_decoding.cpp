@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry/robust.hpp"
 #include "picture/canvas.hpp"
 #include "picture/dimmed_frame.hpp"
 #include "picture/legend.hpp"
@@ -47,9 +48,7 @@ double pitch_px(const Decoding& decoding) {
     if (right >= 0) lengths.push_back((centre(decoding.regions[right]) - centre(region)).norm());
   }
   if (lengths.empty()) return kDefaultPitchPx;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  return std::clamp(*middle, 4.0, 64.0);
+  return std::clamp(median_in_place(lengths), 4.0, 64.0);
 }
 
 int frame_side_px(const GreyView& frame) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/geometry/robust.hpp"
 #include "picture/canvas.hpp"
 #include "picture/depth_colour.hpp"
 #include "picture/relief.hpp"
@@ -70,10 +71,7 @@ double spacing_mm(const Surface& surface) {
   for (const auto& triangle : surface.triangles) {
     lengths.push_back((surface.points[triangle[0]] - surface.points[triangle[1]]).norm());
   }
-  if (lengths.empty()) return 10.0;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  return *middle;
+  return lengths.empty() ? 10.0 : median_in_place(lengths);
 }
 
 void draw_surface(ColourImage& picture, const Surface& surface, const View& view, const Box& box,

@@ -8,6 +8,8 @@
 
 #include <Eigen/Geometry>
 
+#include "core/geometry/robust.hpp"
+
 namespace slsd {
 namespace {
 
@@ -67,9 +69,7 @@ double typical_edge(const std::vector<Eigen::Vector3d>& points, const Lattice& l
     if (quad[0] >= 0 && quad[1] >= 0) edges.push_back(edge(points, quad[0], quad[1]));
     if (quad[0] >= 0 && quad[3] >= 0) edges.push_back(edge(points, quad[0], quad[3]));
   });
-  if (edges.empty()) return 0.0;
-  std::nth_element(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(edges.size() / 2), edges.end());
-  return edges[edges.size() / 2];
+  return median_in_place(edges);
 }
 
 class Joiner {

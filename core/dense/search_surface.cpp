@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/clones.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
@@ -116,7 +117,7 @@ bool SurfaceSearch::choose_levels(const SurfaceGrid& grid) {
     std::nth_element(depths_.begin(), place, depths_.end());
     return static_cast<double>(*place);
   };
-  const double far = at(0.01), near = at(0.99), middle = at(0.5);
+  const double far = at(0.01), near = at(0.99), middle = median_in_place(depths_);
   const auto [width, height] = grid.frame_px();
   levels_.step = std::abs(grid.map_around(0.5 * Eigen::Vector2d(width, height), middle).inverse_depth_per_px);
   const auto [least, most] = grid.inverse_depths();

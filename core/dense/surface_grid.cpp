@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "core/clones.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
@@ -184,10 +185,7 @@ float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, st
     SurfaceNode node;
     misfits_.push_back(accept(frame, batch.tasks[i], node) ? node.residual : 1);
   }
-  if (misfits_.empty()) return 1;
-  const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
-  std::nth_element(misfits_.begin(), middle, misfits_.end());
-  return *middle;
+  return misfits_.empty() ? 1 : median_in_place(misfits_);
 }
 
 void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternField& field,
@@ -214,10 +212,8 @@ void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternFie
       }
     }
     if (offsets_.size() < kOffsetSeedsLeast) return void(epipolar_ = none);
-    const auto middle = offsets_.begin() + static_cast<std::ptrdiff_t>(offsets_.size() / 2);
-    std::nth_element(offsets_.begin(), middle, offsets_.end(),
-                     [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) { return a.z() < b.z(); });
-    epipolar_.middle = middle->z(), epipolar_.slope_x = epipolar_.slope_y = 0;
+    epipolar_.middle = median_in_place(offsets_, [](const Eigen::Vector3f& offset) { return offset.z(); });
+    epipolar_.slope_x = epipolar_.slope_y = 0;
     if (offsets_.size() < kOffsetSlopeSeeds) continue;
     // Fit a plane through the offsets, with small weights for outliers and a prior of small slopes.
     for (int pass = 0; pass < 4; ++pass) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/exposure/tile.hpp"
+#include "core/geometry/robust.hpp"
 
 namespace slsd {
 namespace {
@@ -49,8 +50,7 @@ FrameChange compare(const ImageView<T>& first, const ImageView<T>& second) {
     }
   }
   if (changes.empty()) return change;
-  std::ranges::sort(changes);
-  const double still = changes[changes.size() / 2];
+  const double still = median_in_place(changes);
   const double level = sizeof(T) == 1 ? kMovedLevels : 0;
   const auto moved = std::ranges::count_if(changes, [&](double c) { return c > kMovedNoises * still + level; });
   change.noise = still / kMeanDifference;

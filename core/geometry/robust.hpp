@@ -5,25 +5,29 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <ranges>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 namespace slsd {
 
 /// The median of the values, the upper one of an even number; 0 without values. Reorders the values.
-/// @thread reentrant
-template <std::ranges::random_access_range Values>
-[[nodiscard]] auto median_in_place(Values&& values) -> std::ranges::range_value_t<Values> {
-  if (std::ranges::empty(values)) return 0;
+/// @param number_of  the number in a value, if values are more than numbers
+/// @thread           reentrant
+template <std::ranges::random_access_range Values, class NumberOf = std::identity>
+[[nodiscard]] auto median_in_place(Values&& values, NumberOf number_of = {}) {
+  using Number = std::decay_t<std::invoke_result_t<NumberOf&, std::ranges::range_reference_t<Values>>>;
+  if (std::ranges::empty(values)) return Number(0);
   constexpr int kFew = 16;  // insertion sort up to this size
   const auto middle = std::ranges::begin(values) + std::ranges::ssize(values) / 2;
   if (std::ranges::ssize(values) <= kFew) {
-    std::ranges::sort(values);
+    std::ranges::sort(values, {}, number_of);
   } else {
-    std::ranges::nth_element(values, middle);
+    std::ranges::nth_element(values, middle, {}, number_of);
   }
-  return *middle;
+  return Number(std::invoke(number_of, *middle));
 }
 [[nodiscard]] inline double median_of(std::vector<double> values) {
   return median_in_place(values);

@@ -9,6 +9,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "core/geometry/robust.hpp"
+
 namespace slsd {
 namespace {
 
@@ -130,9 +132,7 @@ float SymbolAligner::align_sample(const GreyView& frame, double full, const Patt
   align_cells(frame, full, field, {}, sample_);
   for (const CellTask& cell : sample_)
     misfits_.push_back(cell.patch.failed ? 1 : cell.patch.residual / cell.patch.state.gain);
-  const auto middle = misfits_.begin() + static_cast<std::ptrdiff_t>(misfits_.size() / 2);
-  std::nth_element(misfits_.begin(), middle, misfits_.end());
-  return *middle;
+  return median_in_place(misfits_);
 }
 
 /// Finds the pattern as the frame shows it: the best blur of the ladder, and the blur near it that the sample asks for.

@@ -10,6 +10,7 @@
 
 #include "core/clones.hpp"
 #include "core/decode/regions/slide.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
@@ -215,10 +216,7 @@ float Binarizer::measure_usual_contrast() {
     const float contrast = high_[i] - low_[i], midway = low_[i] + 0.5F * contrast;
     if (contrast >= contrast_min(midway)) contrasts_.push_back(contrast / noise_.at(midway));
   }
-  if (contrasts_.empty()) return 0;
-  const auto middle = contrasts_.begin() + static_cast<std::ptrdiff_t>(contrasts_.size() / 2);
-  std::ranges::nth_element(contrasts_, middle);
-  return *middle;
+  return median_in_place(contrasts_);
 }
 
 template <class T>

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <utility>
 
+#include "core/geometry/robust.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
@@ -69,7 +70,6 @@ const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) 
   shapes = shapes.first(std::min(shapes.size(), kShapesMax));
   for (std::size_t i = 0; i < shapes.size(); ++i) eights[i / kLanes].set(static_cast<int>(i % kLanes), shapes[i]);
   const std::span likelihoods = std::span(buffer).first(shapes.size());
-  const auto middle = likelihoods.begin() + static_cast<std::ptrdiff_t>(likelihoods.size() / 2);
   std::size_t best = 0;
   float best_median = -1;
   for (std::size_t blur = 0; blur < kBlursPx.size(); ++blur) {
@@ -79,8 +79,7 @@ const Appearance& Appearances::likeliest(std::span<const ShapeFeatures> shapes) 
       if (i % kLanes == 0) classifier.classify(eights[i / kLanes], looks);
       likelihoods[i] = looks[i % kLanes].likelihood;
     }
-    std::ranges::nth_element(likelihoods, middle);
-    if (*middle > best_median) best = blur, best_median = *middle;
+    if (const float median = median_in_place(likelihoods); median > best_median) best = blur, best_median = median;
   }
   return of_blurs()[best];
 }

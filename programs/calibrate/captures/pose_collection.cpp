@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/calibrate/judge/coverage.hpp"
+#include "core/geometry/robust.hpp"
 #include "programs/calibrate/captures/captured_pictures.hpp"
 
 namespace slsd {
@@ -85,10 +86,7 @@ double PoseCollection::usual_blur_px(std::size_t camera) const {
       if (seen.camera == camera) blurs.push_back(seen.blur_px);
     }
   }
-  if (blurs.size() < kUsualMin) return 0;
-  const auto middle = blurs.begin() + static_cast<std::ptrdiff_t>(blurs.size() / 2);
-  std::ranges::nth_element(blurs, middle);
-  return *middle;
+  return blurs.size() < kUsualMin ? 0 : median_in_place(blurs);
 }
 
 std::string PoseCollection::most_helpful() const {

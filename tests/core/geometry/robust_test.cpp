@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -20,6 +21,14 @@ TEST(MedianInPlace, IsTheMiddleOfFewAndOfMany) {
     std::iota(values.begin(), values.end(), 0);
     std::ranges::reverse(values);
     EXPECT_EQ(median_of(values), count / 2) << count;
+  }
+}
+
+TEST(MedianInPlace, ComparesTheNumberInAValue) {
+  for (const int count : {3, 16, 17, 101}) {
+    std::vector<std::pair<int, float>> values;
+    for (int i = 0; i < count; ++i) values.emplace_back(-i, static_cast<float>(i));
+    EXPECT_EQ(median_in_place(values, [](const auto& value) { return value.second; }), static_cast<float>(count / 2));
   }
 }
 
