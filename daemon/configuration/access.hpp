@@ -39,7 +39,7 @@ class AccessRules {
 
   /// The role of a peer. Root, and the user who runs the service, have all rights.
   [[nodiscard]] Role role_of(const Peer& peer) const;
-  /// The remedy for a missing role: "be in the group slsd-admin, and log in again: ...".
+  /// The remedy for a missing role: "join the group slsd-admin, then log in again: ...".
   [[nodiscard]] const std::string& way_to(Role role) const { return ways_[static_cast<std::size_t>(role)]; }
 
  private:

@@ -47,7 +47,7 @@ TEST(AccessRules, SayWhatGivesARole) {
   const auto rules = AccessRules::of(options_of({"*"}, {"daemon"}, {"daemon", "@daemon"}));
   ASSERT_TRUE(rules);
   EXPECT_THAT(rules->way_to(Role::kScan), HasSubstr("[server] scan"));
-  EXPECT_THAT(rules->way_to(Role::kAdminister), HasSubstr("the group daemon, and log in again"));
+  EXPECT_THAT(rules->way_to(Role::kAdminister), HasSubstr("the group daemon, then log in again"));
 }
 
 TEST(AccessRules, RefuseNamesThatTheHostDoesNotKnow) {
