@@ -160,7 +160,7 @@ class Views(unittest.TestCase):
             browser.wait("/% covered/.test(document.getElementById('calibrate-pictures').textContent)", "no coverage")
             self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390)
             browser.picture(self.folder / "calibrating-390.png")
-            browser.wait("document.getElementById('calibrate-state').textContent === 'Calibrated, and in force'", "no verdict")
+            browser.wait("document.getElementById('calibrate-state').textContent === 'Calibrated and in force'", "no verdict")
             self.assertIn("The calibration is ", browser.run("return document.getElementById('verdict').textContent;"))
             self.assertTrue({"TAKEN ✓", "HOLD"} & set(browser.run("return [...window.seen];")))
             browser.picture(self.folder / "calibrated-390.png")

@@ -207,7 +207,7 @@ TEST_F(FromFiles, LeavesAPoseOutOfWhichAPictureIsMissing) {
 
 TEST_F(FromFiles, RefusesAFolderThatIsNotThere) {
   request_.from = home_ / "nowhere";
-  EXPECT_THAT(refusal(), HasSubstr("nowhere: is no folder"));
+  EXPECT_THAT(refusal(), HasSubstr("nowhere: is not a folder"));
 }
 
 TEST_F(FromFiles, LeavesAPoseOutWhosePicturesAreOfTwoSizes) {
