@@ -150,7 +150,7 @@ TEST(FindBoard, SeesNoBoardInAnEmptyImage) {
   for (const char* board : {kCharuco, kChessboard, "circles:4x7:30:30", "plane:4x3:60:45:DICT_5X5_50"}) {
     const Error error = error_of(Grey8(320, 240, 128), board);
     EXPECT_EQ(error.code, ErrorCode::kNotFound) << board << error.message;
-    EXPECT_THAT(error.message, HasSubstr("seen")) << board;
+    EXPECT_THAT(error.message, HasSubstr("visible")) << board;
   }
 }
 

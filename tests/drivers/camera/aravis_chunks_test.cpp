@@ -99,7 +99,7 @@ TEST_F(AravisChunksTest, RefusesAFrameOfAnotherExposure) {
   device_.set_faults({.misexposed_frames = 1});
   const Error error = failure_of(camera);
   EXPECT_EQ(error.code, ErrorCode::kMismatch);
-  EXPECT_THAT(error.message, HasSubstr("its exposure was 20000 us where 10000 is configured"));
+  EXPECT_THAT(error.message, HasSubstr("its exposure was 20000 us, but 10000 is configured"));
   EXPECT_EQ(camera.statistics().misexposed, 1u);
   EXPECT_TRUE(next_is_newest(camera, device_));
   EXPECT_EQ(camera.statistics().lost, 0u);
@@ -109,7 +109,7 @@ TEST_F(AravisChunksTest, RefusesAFrameOfAnotherGain) {
   AravisCamera camera(options_for(device_));
   ASSERT_TRUE(opens(camera));
   device_.set_faults({.misgained_frames = 1});
-  EXPECT_THAT(failure_of(camera).message, HasSubstr("its gain was 1 dB where 0 is configured"));
+  EXPECT_THAT(failure_of(camera).message, HasSubstr("its gain was 1 dB, but 0 is configured"));
   EXPECT_TRUE(next_is_newest(camera, device_));
 }
 

@@ -99,8 +99,8 @@ TEST(UnlikeConfigured, AllowsWhatSensorsRound) {
 TEST(UnlikeConfigured, NamesWhatDiffersAndByHowMuch) {
   const AravisCameraOptions options = set_to(10000.0, 3.0);
   EXPECT_THAT(unlike_configured(settings(20000.0, 3.0), options),
-              HasSubstr("its exposure was 20000 us where 10000 is configured"));
-  EXPECT_THAT(unlike_configured(settings(10000.0, 4.0), options), HasSubstr("its gain was 4 dB where 3 is configured"));
+              HasSubstr("its exposure was 20000 us, but 10000 is configured"));
+  EXPECT_THAT(unlike_configured(settings(10000.0, 4.0), options), HasSubstr("its gain was 4 dB, but 3 is configured"));
   EXPECT_THAT(unlike_configured(settings(0.0, std::nullopt), set_to(20.0, 0.0)), HasSubstr("exposure"));
   EXPECT_THAT(unlike_configured(settings(std::nan(""), std::nullopt), options), HasSubstr("exposure"));
 }

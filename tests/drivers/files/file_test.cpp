@@ -58,7 +58,7 @@ TEST(ReadFile, RefusesWhatIsLongerThanTheLimit) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(refused.error().where, path.string());
-  EXPECT_THAT(refused.error().message, HasSubstr("at most 4"));
+  EXPECT_THAT(refused.error().message, HasSubstr("the limit of 4 bytes"));
 }
 
 TEST(ReadFile, NamesWhatIsWrongWithThePath) {
