@@ -17,7 +17,7 @@
 
 namespace slsd::adversary {
 
-/// What a frame is made of to mislead the decoder.
+/// Kinds of frames that are made to mislead the decoder.
 enum class Kind : std::uint8_t {
   kSlats1,         ///< horizontal slats one symbol high at random depths
   kSlats1to2,      ///< of 1 to 2 symbols

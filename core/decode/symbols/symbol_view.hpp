@@ -25,7 +25,7 @@ struct SymbolViewOptions {
   bool drawn = false;            ///< sharper than any lens: pixels may coincide with the pattern's
 };
 
-/// Whether a frame of this blur is a drawn one, without a lens.
+/// Tells whether a frame of this blur is drawn, without a lens.
 [[nodiscard]] bool is_drawn(std::optional<float> blur_px);
 
 /// One symbol among its neighbours, as a camera might see it.

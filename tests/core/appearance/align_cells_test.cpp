@@ -68,7 +68,7 @@ struct Scene {
   [[nodiscard]] double true_disparity(const PatchMap& map) const {
     return (plane.at_middle - map.reference_inverse_depth) / map.inverse_depth_per_px;
   }
-  /// What the camera sees in the window; elsewhere nothing.
+  /// The frame: what the camera sees in the window, and black elsewhere.
   using Light = std::function<double(const Eigen::Vector2d& off, double light)>;
   [[nodiscard]] Grey16 frame(const Light& light, double noise = 0, unsigned seed = 1) const {
     Grey16 frame(1600, 1200);

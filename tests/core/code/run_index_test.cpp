@@ -10,7 +10,7 @@
 namespace slsd {
 namespace {
 
-/// Whether three of the last letters, at most five, equal those of an earlier run of the line. Slow and plain.
+/// Tells whether three of the last letters, at most five, equal those of an earlier run of the line. Slow and plain.
 bool naive_ends_recurring_run(const std::vector<int>& line, int reach) {
   const int end = static_cast<int>(line.size());
   for (int apart = 1; apart <= reach; ++apart) {

@@ -186,7 +186,7 @@ TEST_F(RecoverOneOfMany, ShowsMoreWhereTwoAloneHoldIt) {
   EXPECT_FALSE(is_recovered_without({kDegraded + 1, kDegraded + kSide}));
 }
 
-/// Those of the degraded one's row that lie to the right of it alone hold it, and those below alone another one there.
+/// Only neighbours to its right support the degraded symbol, and only those below support a second one there.
 class RecoverWhatOneHolds : public RecoverOneOfMany {
  protected:
   static constexpr int kBelow = kDegraded + kSide;

@@ -95,7 +95,7 @@ class RecoveredPlane : public testing::Test {
       return SymbolRecovery(pattern_, letters_).recover(scene);
     });
   }
-  /// How far off the symbol is then, camera px; nothing where it is not recovered.
+  /// Distance of the recovered symbol from its true centre, camera px; empty if it is not recovered.
   std::optional<float> recover() {
     const auto recovered = recover_all();
     if (recovered.empty()) return std::nullopt;
