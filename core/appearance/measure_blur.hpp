@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -32,5 +34,31 @@ class BlurMeter {
 /// Standard deviation after a change of the variance: between 2/3 and 3/2 of the old one, for the equations are linear
 /// only nearby, and in PatternFields' range.
 [[nodiscard]] float changed_blur_px(float blur_px, float change);
+
+/// Patches of a frame aligned with a field, and the blur that they ask for.
+struct BlurSeen {
+  std::size_t aligned = 0, tried = 0;  ///< number of patches
+  float blur_px = 0;                   ///< standard deviation, projector px; the field's own if no patch knows it
+};
+
+/// Finds the field of a frame's blur: from a usual blur, until the blur rests. If most patches fail at the usual blur,
+/// the search starts at the wider one where most are aligned.
+/// @param look  BlurSeen(const PatternField&)
+template <class Look>
+[[nodiscard]] std::shared_ptr<const PatternField> find_field(const PatternFields& fields, Look&& look) {
+  constexpr int kRoundsMost = 8;
+  BlurSeen seen = look(fields.usual());
+  if (2 * seen.aligned < seen.tried) {
+    for (std::size_t rung = PatternFields::kUsualRung + 2; rung < PatternFields::kLadderPx.size(); rung += 2)
+      if (const BlurSeen other = look(fields.rung(rung)); other.aligned > seen.aligned) seen = other;
+  }
+  std::shared_ptr<const PatternField> field = fields.at(seen.blur_px);
+  for (int round = 0; round < kRoundsMost; ++round) {
+    auto next = fields.at(look(*field).blur_px);
+    if (next == field) break;
+    field = std::move(next);
+  }
+  return field;
+}
 
 }  // namespace slsd

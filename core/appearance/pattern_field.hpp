@@ -77,9 +77,12 @@ class PatternFields {
  public:
   static constexpr float kBlurMinPx = 0.35F, kBlurMaxPx = 2.8F;
   static constexpr std::array<float, 8> kLadderPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F, 2.8F};
-  static constexpr std::size_t kKept = 6;  ///< number of fields between those of the ladder
+  static constexpr std::size_t kUsualRung = 1;
+  static constexpr std::size_t kKept = 4;  ///< number of fields between those of the ladder
 
   explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
+  /// Returns the field of the ladder that suits projectors and cameras in focus.
+  [[nodiscard]] const PatternField& usual() const { return rung(kUsualRung); }
   /// Returns a field of the ladder.
   [[nodiscard]] const PatternField& rung(std::size_t rung) const;
   /// Returns the field of the ladder with the nearest blur, a standard deviation in projector px.

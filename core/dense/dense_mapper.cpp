@@ -18,11 +18,6 @@ namespace {
 constexpr double kWindowOfPitch = 0.86, kWindowLessPx = 3;
 constexpr int kWindowLeastPx = 11, kWindowMostPx = 21;
 
-/// Number of the sharpest blurs that a projector and a camera in focus reach.
-constexpr int kUsualBlurs = 4;
-/// Rung of the ladder of blurs from which the search starts.
-constexpr std::size_t kUsualRung = 1;
-
 /// Side of a window. It is at least the stride, so that every pixel lies in some node's window.
 int window_px(double pitch_in_camera_px, int stride_px) {
   const int px = static_cast<int>(std::lround(kWindowOfPitch * pitch_in_camera_px - kWindowLessPx));
@@ -104,7 +99,7 @@ std::size_t DenseMapper::bytes_of_fields(const Lens& projector) {
   const auto samples = [](int px) {
     return static_cast<std::size_t>(px + 2 * PatternField::kBorderPx) * PatternField::kSamplesPerPx;
   };
-  return (PatternFields::kLadderPx.size() + PatternFields::kKept) * samples(projector.width_px) *
+  return (PatternFields::kLadderPx.size() / 2 + PatternFields::kKept) * samples(projector.width_px) *
          samples(projector.height_px) * sizeof(std::uint32_t);
 }
 
@@ -118,8 +113,8 @@ int DenseMapper::stride_px(const Lens& camera, const DenseOptions& options) {
   return stride;
 }
 
-void DenseMapper::warm_up(Executor& executor) {
-  executor.run(kUsualBlurs, [&](int blur, int) { (void)fixed_->fields.rung(static_cast<std::size_t>(blur)); });
+void DenseMapper::warm_up() {
+  (void)fixed_->fields.usual();
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
 }
 
@@ -141,43 +136,13 @@ void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
   }
 }
 
-/// Finds the blur of the ladder that fits best, downhill from a usual one; among all, if no plane fits at that one.
-const PatternField& DenseMapper::find_rung(const DenseFrame& frame) {
-  const auto& fields = fixed_->fields;
-  std::array<float, PatternFields::kLadderPx.size()> misfits;
-  misfits.fill(-1);
-  const auto misfit = [&](std::size_t rung) {
-    if (misfits[rung] < 0) misfits[rung] = grid_.misfit(frame, fields.rung(rung), seeds_);
-    return misfits[rung];
-  };
-  std::size_t best = kUsualRung;
-  if (misfit(best) >= 1) {
-    for (std::size_t rung = 0; rung < misfits.size(); ++rung)
-      if (misfit(rung) < misfit(best)) best = rung;
-  }
-  for (std::size_t from = misfits.size(); from != best;) {
-    from = best;
-    if (from + 1 < misfits.size() && misfit(from + 1) < misfit(best)) best = from + 1;
-    if (from > 0 && misfit(from - 1) < misfit(best)) best = from - 1;
-  }
-  return fields.rung(best);
-}
-
 /// Finds the frame's offset from its epipolar lines, and its blur. An offset looks like blur, and a wrong blur hides
-/// part of the offset. So it estimates them in turn until the blur rests.
-void DenseMapper::find_field(const DenseFrame& frame) {
-  constexpr int kRoundsMost = 6;
-  const PatternFields& fields = fixed_->fields;
-  const auto field_near = [&](const PatternField& field) { return fields.at(grid_.blur_near(frame, field, seeds_)); };
-  const PatternField& usual = fields.rung(kUsualRung);
-  grid_.find_epipolar_offset(frame, usual, seeds_);
-  field_ = field_near(seeds_.empty() ? usual : find_rung(frame));
-  for (int round = 0; round < kRoundsMost; ++round) {
-    grid_.find_epipolar_offset(frame, *field_, seeds_);
-    const auto next = field_near(*field_);
-    if (next == field_) break;
-    field_ = next;
-  }
+/// part of the offset. So it estimates them in turn.
+void DenseMapper::find_pattern(const DenseFrame& frame) {
+  field_ = find_field(fixed_->fields, [&](const PatternField& field) {
+    grid_.find_epipolar_offset(frame, field, seeds_);
+    return grid_.look_at_blur(frame, field, seeds_);
+  });
 }
 
 DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
@@ -195,7 +160,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
     grid_.set_epipolar_offset(from->epipolar);
   } else {
     grid_.clear();
-    find_field(seen);
+    find_pattern(seen);
   }
   const PatternField& field = *field_;
   done(DenseStage::kFindBlur);

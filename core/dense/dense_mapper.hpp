@@ -67,7 +67,7 @@ class DenseMapper {
   static constexpr std::size_t kNodesMost = 2'000'000;
 
   /// Prepares in advance what the first frame would otherwise wait for.
-  void warm_up(Executor& executor);
+  void warm_up();
 
   /// Returns the rays of the camera's pixels.
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
@@ -87,8 +87,7 @@ class DenseMapper {
   struct Fixed;
   explicit DenseMapper(std::shared_ptr<const Fixed> fixed);
   void find_seeds(const DecodedSymbols& symbols);
-  const PatternField& find_rung(const DenseFrame& frame);
-  void find_field(const DenseFrame& frame);
+  void find_pattern(const DenseFrame& frame);
   DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                     DenseObserver* observer, bool next);
 

@@ -61,7 +61,7 @@ SurfaceGrid::SurfaceGrid(const PatchGeometry& geometry, const GridOptions& optio
 std::size_t SurfaceGrid::bytes() const {
   const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
   return of(turned_) + of(nodes_) + of(around_) + of(front_) + of(next_) + of(accepted_) + of(pending_) +
-         of(attempts_) + of(batches_) + of(misfits_) + of(offsets_);
+         of(attempts_) + of(batches_) + of(offsets_);
 }
 
 std::int32_t SurfaceGrid::node_at(const Eigen::Vector2f& camera_px) const {
@@ -157,35 +157,23 @@ std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const PatternField&
   return count;
 }
 
-std::size_t SurfaceGrid::align_sample(const DenseFrame& frame, const PatternField& field,
-                                      std::span<const SurfaceSeed> seeds) {
+BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const PatternField& field,
+                                   std::span<const SurfaceSeed> seeds) {
   const std::size_t step = (seeds.size() + kBatchNodes - 1) / kBatchNodes;
   if (batches_.empty()) batches_.resize(1);
-  return align_some(frame, field, seeds, step / 2, step, batches_[0]);
-}
-
-float SurfaceGrid::blur_near(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
-  const std::size_t count = align_sample(frame, field, seeds);
+  BlurSeen seen;
+  seen.tried = align_some(frame, field, seeds, step / 2, step, batches_[0]);
   blur_meter_.clear();
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < seen.tried; ++i) {
     SurfaceNode node;
     const PatchTask& task = batches_[0].tasks[i];
     if (!accept(frame, task, node)) continue;
+    ++seen.aligned;
     blur_meter_.add(frame.pixels, frame.full, field, kAlign,
                     {.patch = task, .window_px = options_.window_px, .square_half_px = kEverywherePx});
   }
-  return changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
-}
-
-float SurfaceGrid::misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds) {
-  const std::size_t count = align_sample(frame, field, seeds);
-  const Batch& batch = batches_[0];
-  misfits_.clear();
-  for (std::size_t i = 0; i < count; ++i) {
-    SurfaceNode node;
-    misfits_.push_back(accept(frame, batch.tasks[i], node) ? node.residual : 1);
-  }
-  return misfits_.empty() ? 1 : median_in_place(misfits_);
+  seen.blur_px = changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
+  return seen;
 }
 
 void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternField& field,

@@ -116,10 +116,9 @@ class SurfaceGrid {
                   inverse_depth);
   }
 
-  /// Misfit of the pattern at a blur to the seeds: the median of residual over gain; 1 if no plane fits.
-  [[nodiscard]] float misfit(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
-  /// Blur of the frame at the seeds, projector px, from one near it: see BlurMeter. The field's own if no plane fits.
-  [[nodiscard]] float blur_near(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
+  /// Measures the blur of the frame at a sample of the seeds, see BlurMeter.
+  [[nodiscard]] BlurSeen look_at_blur(const DenseFrame& frame, const PatternField& field,
+                                      std::span<const SurfaceSeed> seeds);
 
   /// Measures at some seeds how far the pattern lies off its epipolar lines; later alignments start there.
   void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
@@ -193,8 +192,6 @@ class SurfaceGrid {
   [[nodiscard]] bool accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const;
   std::size_t align_some(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                          std::size_t first, std::size_t step, Batch& batch);
-  /// Aligns a sample of the seeds in the first batch. @return number of tasks that began
-  std::size_t align_sample(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
   void offer(const Attempt& attempt);
   void offer_seeds(std::span<const SurfaceSeed> seeds);
   void grow_fronts(const DenseFrame& frame, const PatternField& field, Executor& executor);
@@ -212,7 +209,6 @@ class SurfaceGrid {
   std::vector<std::int32_t> pending_;   // for each node: its place in the next front, or -1
   std::vector<std::uint8_t> attempts_;  // for each node
   std::vector<Batch> batches_;          // one for each worker
-  std::vector<float> misfits_;
   BlurMeter blur_meter_;
   EpipolarOffset epipolar_;
   std::vector<Eigen::Vector3f> offsets_;  // for each seed: camera px, offset

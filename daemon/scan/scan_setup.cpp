@@ -237,11 +237,11 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));
   if (lanes > 0) setup.lanes.push_back(std::move(*first));
   if (setup.decode.density != Density::kPixels) return setup;
-  // Makes the first scan as quick as later ones.
+  // Makes the first scan wait for little but the field of its blur.
   for (std::size_t lane = 0; lane < setup.lanes.size(); ++lane) {
     for (std::size_t camera = 0; camera < cameras->size(); ++camera) {
       setup.dense->of(lane, camera, setup.lanes[lane][camera], setup.pattern, *setup.calibration, setup.decode)
-          .warm_up(*setup.crew);
+          .warm_up();
     }
   }
   return setup;

@@ -9,8 +9,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
-#include "core/geometry/robust.hpp"
-
 namespace slsd {
 namespace {
 
@@ -25,10 +23,6 @@ constexpr float kOfShading = 0.5F;        // factor of the relative change of th
 
 /// Smallest number of symbols from which the frame's blur is measured.
 constexpr std::size_t kBlurSamples = 40;
-/// Ratio to the least misfit at which wider blurs need not be tried.
-constexpr float kFarWorse = 1.5F;
-/// Number of rounds in which the blur comes to rest.
-constexpr int kBlurRoundsMost = 6;
 
 /// The inverse depth of a patch's plane at a camera pixel, given from the patch's centre.
 double inverse_depth(const PatchMap& map, const PatchState& state, const Eigen::Vector2f& at) {
@@ -124,39 +118,20 @@ CellTask SymbolAligner::cell_of(const LatticeSymbol& symbol, const PixelRay& ray
   return cell;
 }
 
-/// Aligns a sample of the symbols with a field. @return the median of residual over gain; 1 if most fail
-float SymbolAligner::align_sample(const GreyView& frame, double full, const PatternField& field) {
+/// Aligns a sample of the symbols with a field, and measures their blur.
+BlurSeen SymbolAligner::look_at_blur(const GreyView& frame, double full, const PatternField& field) {
   const std::size_t step = std::max<std::size_t>(1, cells_.size() / kBlurSamples);
-  sample_.clear(), misfits_.clear();
+  sample_.clear(), blur_meter_.clear();
   for (std::size_t i = step / 2; i < cells_.size(); i += step) sample_.push_back(cells_[i]);
   align_cells(frame, full, field, {}, sample_);
-  for (const CellTask& cell : sample_)
-    misfits_.push_back(cell.patch.failed ? 1 : cell.patch.residual / cell.patch.state.gain);
-  return median_in_place(misfits_);
-}
-
-/// Finds the pattern as the frame shows it: the best blur of the ladder, and the blur near it that the sample asks for.
-std::shared_ptr<const PatternField> SymbolAligner::find_field(const GreyView& frame, double full) {
-  std::size_t best = 0;
-  float least = std::numeric_limits<float>::max();
-  for (std::size_t rung = 0; rung < PatternFields::kLadderPx.size(); ++rung) {
-    const float misfit = align_sample(frame, full, fields_->rung(rung));
-    if (misfit < least) least = misfit, best = rung;
-    if (misfit > kFarWorse * least) break;
+  BlurSeen seen{.tried = sample_.size()};
+  for (const CellTask& cell : sample_) {
+    if (cell.patch.failed || cell.patch.support < kWholeSupportMin) continue;
+    ++seen.aligned;
+    blur_meter_.add(frame, full, field, {}, cell);
   }
-  const auto field_near = [&](const PatternField& field) {
-    (void)align_sample(frame, full, field);
-    blur_meter_.clear();
-    for (const CellTask& cell : sample_) blur_meter_.add(frame, full, field, {}, cell);
-    return fields_->at(changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0)));
-  };
-  auto field = field_near(fields_->rung(best));
-  for (int round = 0; round < kBlurRoundsMost; ++round) {
-    const auto next = field_near(*field);
-    if (next == field) break;
-    field = next;
-  }
-  return field;
+  seen.blur_px = changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
+  return seen;
 }
 
 /// Tries the planes of the neighbours as starts. If part of a symbol is cut off, many planes nearly fit the rest; its
@@ -242,7 +217,7 @@ const std::vector<AlignedSymbol>& SymbolAligner::align(const GreyView& frame, do
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i)
     cells_.push_back(cell_of(lattice.symbols[i], rays[i], depths_mm[i], noise));
   if (cells_.empty()) return aligned_;
-  const auto field = find_field(frame, full);
+  const auto field = find_field(*fields_, [&](const PatternField& tried) { return look_at_blur(frame, full, tried); });
   align_cells(frame, full, *field, {}, cells_);
   try_neighbours(frame, full, lattice, *field);
   for (std::size_t i = 0; i < cells_.size(); ++i) {

@@ -54,8 +54,7 @@ class SymbolAligner {
  private:
   [[nodiscard]] CellTask cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm,
                                  const FrameNoise& noise) const;
-  float align_sample(const GreyView& frame, double full, const PatternField& field);
-  [[nodiscard]] std::shared_ptr<const PatternField> find_field(const GreyView& frame, double full);
+  [[nodiscard]] BlurSeen look_at_blur(const GreyView& frame, double full, const PatternField& field);
   void try_neighbours(const GreyView& frame, double full, const Lattice& lattice, const PatternField& field);
   [[nodiscard]] AlignedSymbol point_of(const Lattice& lattice, std::size_t index, const PixelRay& ray,
                                        const Eigen::Vector2f& projector_px) const;
@@ -69,7 +68,6 @@ class SymbolAligner {
   std::vector<CellTask> cells_, sample_, again_;
   std::vector<std::size_t> again_for_;  // for each of again_: index of its symbol
   std::vector<AlignedSymbol> aligned_;
-  std::vector<float> misfits_;
   BlurMeter blur_meter_;
 };
 

@@ -3,6 +3,7 @@
 #include "core/appearance/measure_blur.hpp"
 
 #include <array>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -92,6 +93,45 @@ TEST(BlurMeter, KnowsNothingOfWhatFailed) {
   failed.patch.failed = true;
   meter.add(Grey16(1600, 1200).view(), kBlurFull, PatternField(shown_pattern().view(), 0.8F), {}, failed);
   EXPECT_FALSE(meter.change().has_value());
+}
+
+/// A look at a frame of this blur: each patch asks for half of the way, and narrow fields align none if it is wide.
+struct Looks {
+  float blur_px;
+  std::vector<float> at{};
+
+  BlurSeen operator()(const PatternField& field) {
+    at.push_back(field.blur_sigma_px());
+    const bool aligns = field.blur_sigma_px() > 0.5F * blur_px;
+    return {.aligned = aligns ? 9U : 0U,
+            .tried = 10,
+            .blur_px = aligns ? 0.5F * (field.blur_sigma_px() + blur_px) : field.blur_sigma_px()};
+  }
+};
+
+TEST(FindField, GoesOnUntilTheBlurRests) {
+  const PatternFields fields(shown_pattern());
+  Looks looks{0.8F};
+  EXPECT_NEAR(find_field(fields, std::ref(looks))->blur_sigma_px(), 0.8F, 0.02F);
+  EXPECT_EQ(looks.at.front(), fields.usual().blur_sigma_px());
+  EXPECT_LT(looks.at.size(), 8U);
+}
+
+TEST(FindField, StartsWiderIfMostPatchesFail) {
+  const PatternFields fields(shown_pattern());
+  Looks looks{2.4F};
+  EXPECT_NEAR(find_field(fields, std::ref(looks))->blur_sigma_px(), 2.4F, 0.06F);
+}
+
+TEST(FindField, EndsWithoutPatches) {
+  const PatternFields fields(shown_pattern());
+  int looks = 0;
+  const auto field = find_field(fields, [&](const PatternField& tried) {
+    ++looks;
+    return BlurSeen{.blur_px = tried.blur_sigma_px()};
+  });
+  EXPECT_NEAR(field->blur_sigma_px(), fields.usual().blur_sigma_px(), 0.01F);
+  EXPECT_EQ(looks, 2);
 }
 
 TEST(ChangedBlur, StaysNearAndInRange) {
