@@ -60,7 +60,7 @@ struct Cells {
 /// numbers are multiplied.
 [[gnu::always_inline]] inline void find_pixels(int across, const float* columns_u, const float* columns_v, float row_u,
                                                float row_v, const Cells& cells, std::int32_t* pixels) {
-  const auto [middle, width, last] = cells;
+  const float middle = cells.middle_of_square, width = cells.width, last = cells.last;
 #pragma omp simd
   for (int i = 0; i < across; ++i) {
     const float u = columns_u[i] + row_u + middle, v = columns_v[i] + row_v + middle;
