@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstring>
 
 #include "core/cloud/point_record.hpp"
@@ -23,7 +24,7 @@ float float_at(std::string_view record, std::size_t at) {
 }
 
 bool is_measured(std::string_view record) {
-  return float_at(record, kDepthAt) > 0;
+  return !std::isnan(float_at(record, kDepthAt));
 }
 
 std::uint8_t intensity_of(std::string_view record) {
@@ -74,24 +75,30 @@ Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals
   const std::size_t end = bytes.find(kDataBegins);
   const int width = end == std::string_view::npos ? 0 : number_after(bytes.substr(0, end), "\nWIDTH ");
   if (width <= 0 || height <= 0)
-    return fail(ErrorCode::kMalformed, "the cloud is not an organised PCD: its header has no size");
-  const std::string_view records = bytes.substr(end + kDataBegins.size());
-  const DensePcd cloud(records, width, height, normals);
-  if (records.size() < cloud.record(0).size() * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
+    return fail(ErrorCode::kMalformed, "the cloud is no organised PCD: its header has no size");
+  const DensePcd cloud(bytes.substr(end + kDataBegins.size()), width, height, normals);
+  if (cloud.records_.size() / cloud.record_bytes() < cloud.pixels())
     return fail(ErrorCode::kMalformed, "the cloud has fewer points than its header says");
   return cloud;
 }
 
+std::size_t DensePcd::record_bytes() const {
+  return kDensePcdBytes + (normals_ ? kDenseNormalBytes : 0);
+}
+
+std::size_t DensePcd::pixels() const {
+  return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+}
+
 std::string_view DensePcd::record(std::size_t pixel) const {
-  const std::size_t bytes = kDensePcdBytes + (normals_ ? kDenseNormalBytes : 0);
-  return records_.substr(std::min(records_.size(), pixel * bytes), bytes);
+  return records_.substr(pixel * record_bytes(), record_bytes());
 }
 
 std::string DensePcd::to_ply(const DenseFacts& facts) const {
   std::string points;
   std::size_t count = 0;
   DenseFacts all = facts;
-  for (std::size_t pixel = 0; pixel < static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_); ++pixel) {
+  for (std::size_t pixel = 0; pixel < pixels(); ++pixel) {
     const std::string_view from = record(pixel);
     all.cameras = std::max(all.cameras, std::size_t{static_cast<std::uint8_t>(from[kCameraAt])} + 1);
     if (!is_measured(from)) continue;
@@ -110,7 +117,7 @@ Cloud DensePcd::lattice(int step) const {
   for (int y = 0; y < height_; y += step) {
     for (int x = 0; x < width_; x += step) {
       const std::string_view from = record(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + x);
-      if (!is_measured(from)) continue;
+      if (!(float_at(from, kDepthAt) > 0)) continue;
       CloudPoint& point = cloud.points.emplace_back();
       point.x = float_at(from, 0), point.y = float_at(from, 4), point.z = float_at(from, kDepthAt);
       point.column = static_cast<std::uint16_t>(x / step), point.row = static_cast<std::uint16_t>(y / step);

@@ -43,13 +43,15 @@ class DensePcd {
 
   /// Converts to a PLY, without the pixels that are not measured. Counts the cameras itself.
   [[nodiscard]] std::string to_ply(const DenseFacts& facts) const;
-  /// Every step-th pixel of every step-th row as a point whose column and row are its place in that lattice. Leaves out
-  /// pixels that are not measured.
+  /// Every step-th pixel of every step-th row as a point whose column and row are its place in that lattice, as far as
+  /// it lies in front of the first camera.
   [[nodiscard]] Cloud lattice(int step) const;
 
  private:
   DensePcd(std::string_view records, int width, int height, bool normals)
       : records_(records), width_(width), height_(height), normals_(normals) {}
+  [[nodiscard]] std::size_t record_bytes() const;
+  [[nodiscard]] std::size_t pixels() const;
   [[nodiscard]] std::string_view record(std::size_t pixel) const;
 
   std::string_view records_;

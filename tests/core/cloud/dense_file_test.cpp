@@ -23,8 +23,8 @@ void put(std::string& bytes, Value value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-/// Depths of the pixels, row by row.
-constexpr float kDepths[kWidth * kHeight] = {900, kNone, 910, kNone, kNone, 920, 930, kNone, 940, 950, kNone, 960};
+/// Depths of the pixels in the rig, row by row; a second camera may see what lies behind the first.
+constexpr float kDepths[kWidth * kHeight] = {900, kNone, 910, kNone, kNone, 920, 930, kNone, 940, 950, kNone, -960};
 
 /// @param intensity_as_float  as in a PCD
 void put_record(std::string& bytes, int pixel, bool normals, bool intensity_as_float) {
@@ -104,6 +104,10 @@ TEST(DenseFile, ThatIsNoneOrTooShortIsRefused) {
     EXPECT_EQ(read.error().code, ErrorCode::kMalformed);
   }
   EXPECT_FALSE(DensePcd::open(whole, kHeight + 1, false).has_value());
+  // A single record that is cut, and sizes whose product in bytes is beyond 64 bits.
+  EXPECT_FALSE(DensePcd::open(dense_pcd_header(facts(false), 1, 1) + std::string(10, 'x'), 1, false).has_value());
+  constexpr int kMost = std::numeric_limits<int>::max();
+  EXPECT_FALSE(DensePcd::open(dense_pcd_header(facts(false), kMost, kMost) + whole, kMost, false).has_value());
   EXPECT_FALSE(DensePcd::open(whole, kHeight, true).has_value());
 }
 
