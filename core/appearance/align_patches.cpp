@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "core/clones.hpp"
 #include "core/lanes.hpp"
@@ -14,6 +15,9 @@ namespace {
 
 static_assert(kEight == kLanes);
 using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
+
+/// Smallest standard deviation of a pixel, grey levels.
+constexpr float kSigmaLeast = 1e-3F;
 
 /// The order in which the unknowns are eliminated: the disparity last, because its variance is then the inverse of the
 /// last pivot.
@@ -26,13 +30,14 @@ struct Eight {
   IntLanes origin_u, origin_v;  // origin of p, in samples
   Lanes gain, gain_x, gain_y, offset, noise;
   Lanes per_scale;  // scale of the residuals at which a pixel counts half; 0: all count fully
+  Lanes censored, per_censored;  // range of the residuals of saturated pixels about zero, see Censored
   Lanes across, across_weight, gain_slope_weight;
   // Of cells: second derivatives of q, the square of the pattern that counts, and the window's part within the frame.
   Lanes xx[3], xy[3], yy[3];
   Lanes square_u, square_v, square_half;
   IntLanes left_px, right_px, top_px, bottom_px;  // relative to the centre, inclusive
 
-  Lanes step[kFitted], left, weights, pixels, positive, scatter, variance, slope_variance;
+  Lanes step[kFitted], left, weights, pixels, agreed, positive, scatter, variance, slope_variance;
   Lanes covariance[3][3];  // of disparity and slopes: the upper triangle
 };
 
@@ -140,10 +145,10 @@ inline __attribute__((always_inline)) void look_up(const Row<T>& row, int first,
   }
 }
 
-/// @param counted  number of counting pixels; the function adds to it
+/// @param counted, agreed  numbers of pixels; the function adds to them
 template <bool kCells, class T>
 inline __attribute__((always_inline)) void compare(const Row<T>& row, int first, int count, const EightWindows& of,
-                                                   const Eight& e, RowPixels& seen, Lanes& counted) {
+                                                   const Eight& e, RowPixels& seen, Lanes& counted, Lanes& agreed) {
   constexpr float kScale = PatternField::kSamplesPerPx;
   constexpr int kBits = PatternField::kSlopeBits;
   const Lanes zero{}, one = zero + 1;
@@ -160,15 +165,22 @@ inline __attribute__((always_inline)) void compare(const Row<T>& row, int first,
     const Lanes p =
         value * PatternField::kValueUnit + (slope_u * seen.from_u[k] + slope_v * seen.from_v[k]) * (1 / kScale);
     const Lanes g = slope_u * e.along_u + slope_v * e.along_v, c = slope_v * e.along_u - slope_u * e.along_v;
-    const Lanes r = seen.level[k] - e.offset - p * (row.gain + x * e.gain_x);
+    Lanes r = seen.level[k] - e.offset - p * (row.gain + x * e.gain_x);
+    const IntLanes saturated = seen.level[k] >= of.full;
+    Lanes above = r + e.censored;
+    above = above > zero ? above : zero;
+    Lanes knows = above * e.per_censored;
+    knows = (saturated & (knows < one)) ? knows : one;
+    r = (saturated & (0.5F * above > r)) ? 0.5F * above : r;
     const Lanes off = r * e.per_scale;
     const Lanes weight = one / (one + off * off);
-    Lanes counts = seen.level[k] < of.full ? one : zero;
-    if constexpr (kCells) counts *= seen.inside[k];
-    const Lanes w = counts * weight * weight;
+    Lanes agrees = weight * weight;
+    if constexpr (kCells) agrees *= seen.inside[k];
+    const Lanes w = agrees * knows;
     seen.p[k] = p, seen.g[k] = g, seen.c[k] = c, seen.r[k] = r, seen.w[k] = w;
     seen.wg[k] = w * g, seen.wp[k] = w * p;
-    counted += counts;
+    if constexpr (kCells) counted += seen.inside[k];
+    agreed += agrees;
   }
 }
 
@@ -223,7 +235,7 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
     right[i] = zero;
     for (Lanes& entry : normal[i]) entry = zero;
   }
-  Lanes squares = zero, counted = zero;
+  Lanes squares = zero, counted = zero, agreed = zero;
   const int half = of.side / 2, thirds = (of.side - 1) / 6;
   RowPixels seen;
   for (int down = -half; down <= half; ++down) {
@@ -243,7 +255,7 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
     for (int first = -half; first <= half; first += RowPixels::kMost) {
       const int count = std::min(RowPixels::kMost, half + 1 - first);
       look_up<kCells>(row, first, count, of, e, seen);
-      compare<kCells>(row, first, count, of, e, seen, counted);
+      compare<kCells>(row, first, count, of, e, seen, counted, agreed);
       RowSums sum;
       sum_up(seen, first, count, thirds, sum);
       NinthSums* const ninth = ninths[down < -thirds ? 0 : down > thirds ? 2 : 1];
@@ -280,7 +292,8 @@ inline __attribute__((always_inline)) void step_eight(const T* const* pixels, co
   }
   normal[kSlopeX][kGain] = normal[kDisparity][kGainX], normal[kSlopeY][kGain] = normal[kDisparity][kGainY];
   normal[kSlopeY][kGainX] = normal[kSlopeX][kGainY];
-  e.weights = normal[kOffset][kOffset], e.pixels = counted;
+  e.weights = normal[kOffset][kOffset], e.agreed = agreed;
+  e.pixels = kCells ? counted : zero + static_cast<float>(of.side * of.side);
 
   // Prior knowledge, see AlignPriors.
   normal[kAcross][kAcross] += e.across_weight, right[kAcross] -= e.across_weight * e.gain * e.across;
@@ -403,14 +416,18 @@ void put(Eight& e, int lane, const PatchTask& task, const AlignOptions& options)
   e.gain[lane] = state.gain, e.gain_x[lane] = state.gain_x, e.gain_y[lane] = state.gain_y;
   e.offset[lane] = state.offset, e.noise[lane] = task.noise, e.across[lane] = state.across;
   const float squares = task.noise * task.noise + options.misfit_share * options.misfit_share * state.gain * state.gain;
-  e.per_scale[lane] = state.gain > 0 ? 1 / (options.outlier_sigmas * std::sqrt(squares)) : 0;
+  const float sigma = std::max(kSigmaLeast, std::sqrt(squares));
+  e.per_scale[lane] = state.gain > 0 ? 1 / (options.outlier_sigmas * sigma) : 0;
+  // Without a gain, a saturated pixel tells nothing.
+  e.censored[lane] = state.gain > 0 ? kCensoredSigmas * sigma : std::numeric_limits<float>::lowest();
+  e.per_censored[lane] = 0.5F / e.censored[lane];
   const AlignPriors priors = align_priors(options, task.noise, state.gain);
   e.across_weight[lane] = priors.across, e.gain_slope_weight[lane] = priors.gain_slope;
 }
 
 void take(const Eight& e, int lane, PatchTask& task) {
   task.pixels = e.pixels[lane];
-  task.support = e.weights[lane] / std::max(1.F, task.pixels);
+  task.support = e.agreed[lane] / std::max(1.F, task.pixels);
   PatchState& state = task.state;
   const float gain = state.gain + e.step[kGain][lane];
   bool finite = true;

@@ -25,6 +25,10 @@ struct AlignOptions {
   float outlier_sigmas = 4;
 };
 
+/// Standard deviations by which a model may lie above or below the full level while noise decides about saturation: at
+/// the full level, a saturated pixel's mean residual is then 0.8 of them, as that of a normal distribution.
+inline constexpr float kCensoredSigmas = 3.2F;
+
 /// The fitted parameters: disparity, its slopes, across; gain, its slopes, offset.
 inline constexpr int kFitted = 8;
 /// Number of patches aligned at once.
@@ -41,7 +45,7 @@ struct PatchTask {
   float moved = 0;           ///< the last step's change of the disparity, projector px
   float residual = 0;        ///< root mean square after the last step, grey levels
   float pixels = 0;          ///< number of pixels
-  float support = 0;         ///< share of them that agreed with the pattern before the last step
+  float support = 0;         ///< share of them that agreed with the pattern before the last step; saturated ones too
   float scatter = 0;         ///< scatter of the ninths about the plane, px, beyond noise
   float variance = 0;        ///< variance of the disparity, for a noise of one grey level in each pixel
   float slope_variance = 0;  ///< variance of its slopes, mean of both
@@ -72,6 +76,19 @@ struct AlignPriors {
               : 0};
 }
 
+/// The residual of a saturated pixel and its weight. The pixel's light is at the full level or anywhere above, so the
+/// pixel agrees with any model above that level (Tobin 1958). Steps by the score of that censored normal distribution,
+/// with a parabola for the part where noise decides.
+struct Censored {
+  float residual, weight;
+};
+/// @param residual  of the full level
+/// @param sigma     one standard deviation of noise and misfit, grey levels
+[[nodiscard]] inline Censored censored(float residual, float sigma) {
+  const float above = residual + kCensoredSigmas * sigma;
+  return {std::max({0.F, residual, 0.5F * above}), std::clamp(above / (2 * kCensoredSigmas * sigma), 0.F, 1.F)};
+}
+
 /// Aligns windows of the frame with the pattern by least squares of
 ///
 ///     I(x, y) = (gain + gain_x x + gain_y y) P(p(x, y)) + offset
@@ -79,7 +96,7 @@ struct AlignPriors {
 /// with P the blurred pattern, by one step of Gauss and Newton (Lucas and Kanade 1981; Baker and Matthews 2004). Pixels
 /// far off the last step's result count less. Takes up to eight windows of the same size, one in each lane: no
 /// operation crosses lanes, and the eight systems of equations are solved at once. Ignores bends.
-/// @param full       the level of a saturated pixel, which does not count
+/// @param full       the level of a saturated pixel, see Censored
 /// @param window_px  odd: side of the windows, which lie within the frame
 /// @thread reentrant
 void align_eight(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,

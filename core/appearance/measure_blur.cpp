@@ -33,7 +33,8 @@ Sums sum_up(const ImageView<T>& frame, double full, const PatternField& field, c
   const PatchTask& patch = task.patch;
   const PatchMap& map = patch.map;
   const PatchState& state = patch.state;
-  const float per_scale = 1 / (options.outlier_sigmas * std::hypot(patch.noise, options.misfit_share * state.gain));
+  const float sigma = std::hypot(patch.noise, options.misfit_share * state.gain),
+              per_scale = 1 / (options.outlier_sigmas * sigma);
   const int half = task.window_px / 2;
   const int left = std::max(-half, -patch.x), right = std::min(half, frame.width - 1 - patch.x),
             top = std::max(-half, -patch.y), bottom = std::min(half, frame.height - 1 - patch.y);
@@ -41,14 +42,18 @@ Sums sum_up(const ImageView<T>& frame, double full, const PatternField& field, c
   for (int y = top; y <= bottom; ++y) {
     for (int x = left; x <= right; ++x) {
       const auto level = static_cast<float>(frame.at(patch.x + x, patch.y + y));
-      if (static_cast<double>(level) >= full) continue;
       const Eigen::Vector2f off(static_cast<float>(x), static_cast<float>(y));
       const Eigen::Vector2f p = projector_offset(map, state, off) + map.origin_px.cast<float>();
       if ((p - task.square_middle_px).cwiseAbs().maxCoeff() > task.square_half_px) continue;
       const PatternField::Sample light = field.at(p.x(), p.y());
       const float gain = state.gain + state.gain_x * off.x() + state.gain_y * off.y();
-      const float residual = level - state.offset - gain * light.value;
-      const float off_scale = residual * per_scale, agrees = 1 / (1 + off_scale * off_scale), weight = agrees * agrees;
+      float residual = level - state.offset - gain * light.value, weight = 1;
+      if (static_cast<double>(level) >= full) {
+        const Censored clipped = censored(residual, sigma);
+        residual = clipped.residual, weight = clipped.weight;
+      }
+      const float off_scale = residual * per_scale, agrees = 1 / (1 + off_scale * off_scale);
+      weight *= agrees * agrees;
       const float g = gain * (light.slope_u * map.along.x() + light.slope_v * map.along.y()),
                   c = gain * (light.slope_v * map.along.x() - light.slope_u * map.along.y()),
                   by_blur = gain * half_laplacian(field, p.x(), p.y());

@@ -20,7 +20,7 @@ class BlurMeter {
  public:
   void clear() { patches_.clear(); }
   /// Adds a patch that was aligned with the field.
-  /// @param full  the level of a saturated pixel, which does not count
+  /// @param full  the level of a saturated pixel, see Censored
   void add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
            const CellTask& task);
   /// Change of the variance, projector px^2: the median of the patches, weighted by what each knows. Empty without a

@@ -23,8 +23,8 @@ constexpr int kBlockNodes = 8;
 constexpr float kMovedTogether = 2;
 /// Largest change of the light, as a share of the gain.
 constexpr float kGainChange = 0.1F;
-/// Least share of the window's pixels that are not saturated.
-constexpr float kSeenMin = 0.7F;
+/// Least number of a window's unsaturated pixels for each fitted parameter.
+constexpr float kSeenMin = 4;
 /// Smallest share of a frame's nodes that continue; with fewer, the next frame starts afresh.
 constexpr double kFollowedMin = 0.5;
 /// Excess of still nodes over continued ones above which a new frame is kept, which itself takes time.
@@ -168,8 +168,8 @@ void GridFollower::follow_row(const DenseFrame& frame, const FollowedFrame& from
             if (from.tried[index] && move.squares <= of_pixel * move.counted) grid.close(index);
             continue;
           }
-          const float window = static_cast<float>(window_px_ * window_px_), per_gain = 1 / before.gain;
-          if (move.counted < kSeenMin * window || !(move.left <= of_pixel * (move.counted - kFitted))) continue;
+          const float per_gain = 1 / before.gain;
+          if (move.counted < kSeenMin * kFitted || !(move.left <= of_pixel * (move.counted - kFitted))) continue;
           const float disparity = move.step[kDisparity] * per_gain, slope_x = move.step[kSlopeX] * per_gain,
                       slope_y = move.step[kSlopeY] * per_gain;
           if (!(std::abs(disparity) + static_cast<float>(half) * (std::abs(slope_x) + std::abs(slope_y)) < kFollowPx))

@@ -36,11 +36,17 @@ constexpr float kMisfit = 0.04F;                               // of the dark: s
 constexpr float kGainSpread = 0.12F;                           // of the light: print, relief
 constexpr float kPlaceSpread = 0.2F;                           // camera px
 constexpr float kOutliers = 0.05F;                             // share of the pixels
-constexpr float kLevels = 1.6F;                                // over which outliers are spread
+constexpr float kLevels = 1.6F, kLevelsEnd = 1.3F;             // over which outliers are spread, and their end
+constexpr float kTailLeast = 0.02F;                            // share of the outliers beyond any level
 constexpr float kDark = 0.4F, kLit = 0.35F, kBetween = 0.25F;  // levels of a pixel on another surface
 
 float normal(float off, float sigma) {
   return std::exp(-0.5F * off * off / (sigma * sigma)) / (sigma * std::sqrt(2 * std::numbers::pi_v<float>));
+}
+
+/// Integral of normal() above a level.
+float normal_above(float off, float sigma) {
+  return 0.5F * std::erfc(off / (sigma * std::numbers::sqrt2_v<float>));
 }
 
 std::uint32_t packed(const Evidence& evidence) {
@@ -58,42 +64,48 @@ Evidence unpacked(std::uint32_t entry) {
 
 }  // namespace
 
-Evidence EvidenceTable::reckon(float expected, float seen, float slope, float noise) {
+Evidence EvidenceTable::reckon(float expected, float seen, float slope, float noise, bool saturated) {
   const auto square = [](float x) { return x * x; };
   const auto sigma = [&](float light, float steep) {
     return std::sqrt(square(noise) + square(kMisfit) + square(kGainSpread * light) + square(kPlaceSpread * steep));
   };
-  const float outlier = 1 / kLevels;
-  const float here = (1 - kOutliers) * normal(seen - expected, sigma(expected, slope)) + kOutliers * outlier;
-  const float dark = normal(seen, sigma(0, 0));
-  const float another = kDark * dark + kLit * normal(seen - 1, sigma(1, 0)) + kBetween * outlier;
+  const auto chance = [&](float light, float steep) {
+    const float off = seen - light, spread = sigma(light, steep);
+    return saturated ? normal_above(off, spread) : normal(off, spread);
+  };
+  const float outlier = saturated ? std::clamp((kLevelsEnd - seen) / kLevels, kTailLeast, 1.F) : 1 / kLevels;
+  const float here = (1 - kOutliers) * chance(expected, slope) + kOutliers * outlier;
+  const float dark = chance(0, 0);
+  const float another = kDark * dark + kLit * chance(1, 0) + kBetween * outlier;
   const float unlit = (1 - kOutliers) * dark + kOutliers * outlier;
   return {std::log(here / another), std::log(here / unlit)};
 }
 
 EvidenceTable::EvidenceTable() {
-  table_.reserve(static_cast<std::size_t>(kExpected) * kSeen * kSlopes * kNoises);
+  table_.reserve(2 * static_cast<std::size_t>(kOfLight) * kNoises);
   for (int noise = 0; noise < kNoises; ++noise)
-    for (int slope = 0; slope < kSlopes; ++slope)
-      for (int expected = 0; expected < kExpected; ++expected)
-        for (int seen = 0; seen < kSeen; ++seen)
-          table_.push_back(packed(
-              reckon(static_cast<float>(expected) / (kExpected - 1), kSeenFirst + kSeenStep * static_cast<float>(seen),
-                     kSlopeStep * static_cast<float>(slope), kNoiseFirst * static_cast<float>(1 << noise))));
+    for (const bool saturated : {false, true})
+      for (int slope = 0; slope < kSlopes; ++slope)
+        for (int expected = 0; expected < kExpected; ++expected)
+          for (int seen = 0; seen < kSeen; ++seen)
+            table_.push_back(packed(reckon(
+                static_cast<float>(expected) / (kExpected - 1), kSeenFirst + kSeenStep * static_cast<float>(seen),
+                kSlopeStep * static_cast<float>(slope), kNoiseFirst * static_cast<float>(1 << noise), saturated)));
 }
 
 const std::uint32_t* EvidenceTable::entries(float noise) const {
   int loud = 0;
   for (float limit = 1.41F * kNoiseFirst; loud + 1 < kNoises && noise > limit; limit *= 2) ++loud;
-  return table_.data() + static_cast<std::ptrdiff_t>(loud) * kSlopes * kExpected * kSeen;
+  return table_.data() + 2 * static_cast<std::ptrdiff_t>(loud) * kOfLight;
 }
 
-Evidence EvidenceTable::at(float expected, float seen, float slope, float noise) const {
+Evidence EvidenceTable::at(float expected, float seen, float slope, float noise, bool saturated) const {
   const auto step = [](float value, int count) {
     return static_cast<int>(std::clamp(value + 0.5F, 0.F, static_cast<float>(count - 1)));
   };
   const int row = step(slope / kSlopeStep, kSlopes) * kExpected + step(expected * (kExpected - 1), kExpected);
-  return unpacked(entries(noise)[row * kSeen + step((seen - kSeenFirst) / kSeenStep, kSeen)]);
+  const int entry = row * kSeen + step((seen - kSeenFirst) / kSeenStep, kSeen);
+  return unpacked(entries(noise)[saturated ? kOfLight + entry : entry]);
 }
 
 namespace {
@@ -110,7 +122,7 @@ struct Weighing {
   const std::uint32_t* samples;
   int field_width, field_height;
   float slope_unit, px_per_px;
-  float gain, gain_x, gain_y, offset;
+  float gain, gain_x, gain_y, offset, full;
   const std::uint32_t* entries;
 };
 
@@ -162,10 +174,10 @@ inline __attribute__((always_inline)) void weigh_lanes(const Weighing& in, float
     const IntLanes entry =
         (__builtin_convertvector(slope, IntLanes) * Table::kExpected + __builtin_convertvector(expected, IntLanes)) *
             Table::kSeen +
-        __builtin_convertvector(step, IntLanes);
+        __builtin_convertvector(step, IntLanes) + ((seen >= in.full) & Table::kOfLight);
     BitLanes found;
     for (int lane = 0; lane < kLanes; ++lane) found[lane] = in.entries[entry[lane]];
-    const Lanes counted = seen > zero ? zero + Table::kUnit : zero;  // negative: outside, or saturated
+    const Lanes counted = seen > zero ? zero + Table::kUnit : zero;  // negative: outside
     const Lanes another = __builtin_convertvector(reinterpret_cast<IntLanes>(found) >> 16, Lanes) * counted;
     const Lanes unlit = __builtin_convertvector(reinterpret_cast<IntLanes>(found << 16) >> 16, Lanes) * counted;
     const Lanes low = __builtin_shufflevector(another, unlit, 0, 8, 1, 9, 2, 10, 3, 11),
@@ -385,7 +397,7 @@ void PixelJudge::blend(const Cell& cell, const float* least, const float* own) c
   }
 }
 
-/// Reads the pixels in and around the cell; -1 for pixels that do not count.
+/// Reads the pixels in and around the cell; -1 for pixels outside the frame.
 void PixelJudge::see(const Cell& cell, Scratch& scratch) const {
   std::visit(
       [&](const auto& pixels) {
@@ -399,12 +411,8 @@ void PixelJudge::see(const Cell& cell, Scratch& scratch) const {
           const auto* row = pixels.row(from_y + j);
           const int first = std::clamp(-from_x, 0, side_), end = std::clamp(pixels.width - from_x, 0, side_);
           std::fill(to, to + first, -1.F), std::fill(to + end, to + side_, -1.F);
-          // At least a tenth of a level: zero is a valid level, not the marker -1.
-          const auto full = static_cast<float>(cell.frame.full);
-          for (int i = first; i < end; ++i) {
-            const auto level = static_cast<float>(row[from_x + i]);
-            to[i] = level < full ? level + 0.01F : -1.F;
-          }
+          // A hundredth of a level more: zero is a valid level, not the marker -1.
+          for (int i = first; i < end; ++i) to[i] = static_cast<float>(row[from_x + i]) + 0.01F;
         }
       },
       cell.frame.pixels);
@@ -431,6 +439,7 @@ void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate,
   in.samples = cell.field.samples(), in.field_width = cell.field.width(), in.field_height = cell.field.height();
   in.slope_unit = cell.field.slope_unit();
   in.gain = node.gain, in.gain_x = node.gain_x, in.gain_y = node.gain_y, in.offset = node.offset;
+  in.full = static_cast<float>(cell.frame.full);
   in.entries = table_.entries(cell.frame.noise.at(node.offset + 0.5F * node.gain) / node.gain);
   Cloned<weigh_lanes>::call(in, scratch.evidence.data());
   const int stride = cell.grid.stride_px();

@@ -145,7 +145,6 @@ bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, 
         for (std::size_t i = 0; i < xs_.size(); ++i) {
           const auto level =
               static_cast<float>(image.at(place.x() + static_cast<int>(xs_[i]), place.y() + static_cast<int>(ys_[i])));
-          if (static_cast<double>(level) >= frame.full) return false;
           scratch.levels[i] = level, sum += weights_[i] * level, pixels += weights_[i];
         }
         return true;

@@ -20,7 +20,6 @@ constexpr int kStepsMost = 4;
 
 /// Conditions of a good fit: docs/notes/2026-11-dense.md has the reason for each.
 constexpr float kSupportMin = 0.6F;   // share of the window's pixels that agree
-constexpr float kSeenMin = 0.7F;      // share of them in the frame and not saturated
 constexpr float kResidualMax = 0.3F;  // share of the gain
 constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the range in which the fit converges
 constexpr float kSlopeMax = 0.5F;     // projector px for one camera px: steeper faces show too little of the pattern
@@ -30,8 +29,6 @@ constexpr float kContrastMin = 4;       // ratio of the gain to the noise of a p
 
 /// Parts of sigma, as for symbols (docs/notes/2026-11-decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
-/// Factor of the window's saturated share: pixels at its borders are wrong too.
-constexpr float kOfUnseen = 4;
 
 /// Numbers of seeds for the epipolar offset: at most, at least for its middle, and at least for its slopes.
 constexpr std::size_t kOffsetSeeds = 256, kOffsetSeedsLeast = 8, kOffsetSlopeSeeds = 48;
@@ -110,7 +107,6 @@ void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batc
 
 bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const {
   if (task.failed || task.support < kSupportMin) return false;
-  if (task.pixels < kSeenMin * static_cast<float>(options_.window_px * options_.window_px)) return false;
   const PatchState& found = task.state;
   const float noise = frame.noise.at(found.offset + 0.5F * found.gain);
   if (task.residual > kResidualMax * found.gain || found.gain < kContrastMin * noise) return false;
@@ -122,7 +118,6 @@ bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, Surface
   node.slope_noise = std::sqrt(task.slope_variance) * task.residual;
   node.sigma_px = std::sqrt(kLeastPx * kLeastPx + node.noise_px * node.noise_px +
                             kOfScatter * kOfScatter * task.scatter * task.scatter);
-  node.sigma_px *= 1 + kOfUnseen * (1 - task.pixels / static_cast<float>(options_.window_px * options_.window_px));
   if (!(node.sigma_px < kSigmaMaxPx)) return false;
   const auto per_px = static_cast<float>(task.map.inverse_depth_per_px);
   node.plane = {static_cast<float>(task.map.reference_inverse_depth +

@@ -167,12 +167,36 @@ TEST(AlignEight, FindsTheLightWhereNoneIsKnown) {
   }
 }
 
-TEST(AlignEight, SaturatedPixelsDoNotCount) {
-  const PatchTask start = seen().task(750, 520, 0.1F);
-  std::array<PatchTask, 1> tasks{start};
-  align(seen().frame.view(), 150, tasks);
-  EXPECT_LT(tasks[0].pixels, kSide * kSide - 5);
-  expect_same(tasks[0], one_step(seen().frame.view(), 150, start));
+/// The frame through a sensor that is full at a level.
+Grey8 clipped_at(std::uint8_t full) {
+  Grey8 frame = seen().frame;
+  for (int y = 0; y < frame.height(); ++y)
+    for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = std::min(frame.at(x, y), full);
+  return frame;
+}
+
+TEST(AlignEight, SaturatedPixelsCountAsInThePlainForm) {
+  for (const std::uint8_t full : {150, 80}) {
+    const Grey8 frame = clipped_at(full);
+    PatchTask start = seen().task(750, 520, 0.1F);
+    for (int step = 0; step < 4; ++step) {
+      std::array<PatchTask, 1> tasks{start};
+      align(frame.view(), full, tasks);
+      expect_same(tasks[0], one_step(frame.view(), full, start));
+      start.state = tasks[0].state;
+    }
+  }
+}
+
+TEST(AlignEight, ClippingMakesNoErrorBeyondSigma) {
+  const Grey8 frame = clipped_at(90);
+  std::array<PatchTask, kEight> tasks = seen().tasks();
+  for (int step = 0; step < 6; ++step) align(frame.view(), 90, tasks);
+  for (const PatchTask& task : tasks) {
+    ASSERT_FALSE(task.failed);
+    EXPECT_GT(task.support, 0.8F);
+    EXPECT_LT(std::abs(task.state.disparity), 5 * std::sqrt(task.variance) * task.residual + 0.01F);
+  }
 }
 
 TEST(AlignEight, SixteenBitsAreTheSame) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 #include <vector>
 
@@ -39,8 +40,8 @@ PlainStep plain_step(const ImageView<T>& frame, double full, const PatternField&
   };
   std::vector<Pixel> seen;
   PlainStep result{.state = before};
-  double squares = 0, weights = 0;
-  const double scale = options.outlier_sigmas * std::hypot(noise, options.misfit_share * before.gain);
+  double squares = 0, weights = 0, agreed = 0;
+  const double sigma = std::hypot(noise, options.misfit_share * before.gain), scale = options.outlier_sigmas * sigma;
   for (int down = -half; down <= half; ++down) {
     for (int along = -half; along <= half; ++along) {
       if (x + along < 0 || y + down < 0 || x + along >= frame.width || y + down >= frame.height) continue;
@@ -49,22 +50,29 @@ PlainStep plain_step(const ImageView<T>& frame, double full, const PatternField&
       const Eigen::Vector2f p = projector_offset(map, before, off_px) + map.origin_px.cast<float>();
       const double inside =
           std::min<double>(1, task.square_half_px - (p - task.square_middle_px).cwiseAbs().maxCoeff());
-      if (level >= full || inside <= 0) continue;
+      if (inside <= 0) continue;
       const PatternField::Sample light = field.at(p.x(), p.y());
       const double g = light.slope_u * map.along.x() + light.slope_v * map.along.y(),
                    c = light.slope_v * map.along.x() - light.slope_u * map.along.y();
-      const double off =
+      double off =
           level - before.offset - light.value * (before.gain + before.gain_x * off_px.x() + before.gain_y * off_px.y());
-      const double weight = before.gain > 0 ? inside * std::pow(1 + std::pow(off / scale, 2), -2) : inside;
+      double knows = 1;
+      if (level >= full) {
+        const double half = before.gain > 0 ? kCensoredSigmas * sigma : -std::numeric_limits<double>::max();
+        knows = off <= -half ? 0 : off >= half ? 1 : (off + half) / (2 * half);
+        off = off <= -half ? 0 : off >= half ? off : (off + half) / 2;
+      }
+      const double agrees = before.gain > 0 ? inside * std::pow(1 + std::pow(off / scale, 2), -2) : inside;
+      const double weight = knows * agrees;
       Pixel& pixel = seen.emplace_back();
       pixel.row << g, g * off_px.x(), g * off_px.y(), c, light.value, light.value * off_px.x(),
           light.value * off_px.y(), 1;
       pixel.off = off, pixel.weight = weight, pixel.ninth = 3 * part_of(down) + part_of(along);
       normal += weight * pixel.row * pixel.row.transpose(), right += weight * off * pixel.row;
-      squares += weight * off * off, weights += weight, result.pixels += inside;
+      squares += weight * off * off, weights += weight, agreed += agrees, result.pixels += inside;
     }
   }
-  result.support = weights / std::max(1.0, result.pixels);
+  result.support = agreed / std::max(1.0, result.pixels);
   const AlignPriors priors = align_priors(options, noise, before.gain);
   normal(3, 3) += priors.across, right[3] -= priors.across * before.gain * before.across;
   normal(5, 5) += priors.gain_slope, right[5] -= priors.gain_slope * before.gain_x;

@@ -37,15 +37,28 @@ TEST(EvidenceTable, AtAnEdgeOfTheLightAPixelMayBeEither) {
             EvidenceTable::reckon(0.5F, 0.7F, 0, 0.02F).against_another);
 }
 
+TEST(EvidenceTable, SaturatedPixelMayBeAnyBrighter) {
+  const auto reckon = [](float expected, float full) {
+    return EvidenceTable::reckon(expected, full, 0, 0.02F, true);
+  };
+  EXPECT_GT(reckon(1, 0.5F).against_another, 0.5);
+  EXPECT_GT(reckon(1, 0.5F).against_unlit, 2);
+  EXPECT_NEAR(reckon(1, 0.5F).against_another, reckon(0.8F, 0.5F).against_another, 0.05);
+  EXPECT_LT(reckon(0, 0.5F).against_another, -1.5);
+}
+
 TEST(EvidenceTable, TableIsWhatIsReckoned) {
   const EvidenceTable table;
   for (const float expected : {0.F, 0.25F, 0.5F, 1.F}) {
     for (const float seen : {-0.1F, 0.F, 0.5F, 1.F, 1.3F}) {
       for (const float noise : {0.01F, 0.04F, 0.16F}) {
-        const Evidence wanted = EvidenceTable::reckon(expected, seen, 0.2F, noise);
-        const Evidence got = table.at(expected, seen, 0.2F, noise);
-        EXPECT_NEAR(got.against_another, wanted.against_another, 0.01) << expected << " " << seen << " " << noise;
-        EXPECT_NEAR(got.against_unlit, wanted.against_unlit, 0.01) << expected << " " << seen << " " << noise;
+        for (const bool saturated : {false, true}) {
+          SCOPED_TRACE(testing::Message() << expected << " " << seen << " " << noise << " " << saturated);
+          const Evidence wanted = EvidenceTable::reckon(expected, seen, 0.2F, noise, saturated);
+          const Evidence got = table.at(expected, seen, 0.2F, noise, saturated);
+          EXPECT_NEAR(got.against_another, wanted.against_another, 0.01);
+          EXPECT_NEAR(got.against_unlit, wanted.against_unlit, 0.01);
+        }
       }
     }
   }
