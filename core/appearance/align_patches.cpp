@@ -29,7 +29,7 @@ struct Eight {
   Lanes across_u, across_v, along_u, along_v;
   IntLanes origin_u, origin_v;  // origin of p, in samples
   Lanes gain, gain_x, gain_y, offset, noise;
-  Lanes per_scale;  // scale of the residuals at which a pixel counts half; 0: all count fully
+  Lanes per_scale;               // scale of the residuals at which a pixel counts half; 0: all count fully
   Lanes censored, per_censored;  // range of the residuals of saturated pixels about zero, see Censored
   Lanes across, across_weight, gain_slope_weight;
   // Of cells: second derivatives of q, the square of the pattern that counts, and the window's part within the frame.

@@ -18,6 +18,13 @@ namespace {
 
 constexpr int kRowsAlike = 4;
 
+/// Shares of saturated pixels around a tile from which the threshold rises, and at which it is highest. Symbols cover
+/// more than a third; a lamp or a glint covers less than the first.
+constexpr float kSaturatedFirst = 0.05F, kSaturatedMost = 0.2F;
+/// Place of the highest threshold between dark and the full level. The light of saturated symbols is unknown, but the
+/// middle of their edges lies this high or higher.
+constexpr float kSaturatedLevel = 0.95F;
+
 /// Minimum and maximum of each column over a band of rows, updated with one more row.
 template <class T>
 inline __attribute__((always_inline)) void extend_columns(const T* pixels, int width, T* least, T* greatest) {
@@ -132,21 +139,41 @@ void Binarizer::find_extremes(const ImageView<T>& frame, int row, RowBuffers<T>&
   Cloned<slide_extremes<T>>::call(least.data(), greatest.data(), static_cast<int>(least.size()), tile);
   for (int column = 0; column < columns_; ++column) {
     least_[(row + 1) * stride_ + 1 + column] = least[column * tile];
-    greatest_[(row + 1) * stride_ + 1 + column] = greatest[column * tile];
+    const float brightest = greatest_[(row + 1) * stride_ + 1 + column] = greatest[column * tile];
+    saturated_[(row + 1) * stride_ + 1 + column] = brightest >= full_ ? saturated_share(frame, column * tile, top) : 0;
   }
 }
 
-void Binarizer::set_thresholds(float greatest) {
+/// The share of a tile's pixels that are saturated.
+template <class T>
+float Binarizer::saturated_share(const ImageView<T>& frame, int left, int top) const {
+  const int right = std::min(left + options_.tile_px, frame.width),
+            bottom = std::min(top + options_.tile_px, frame.height);
+  std::ptrdiff_t saturated = 0;
+  for (int y = top; y < bottom; ++y)
+    saturated += std::count_if(frame.row(y) + left, frame.row(y) + right,
+                               [&](T level) { return static_cast<float>(level) >= full_; });
+  return static_cast<float>(saturated) / static_cast<float>((right - left) * (bottom - top));
+}
+
+void Binarizer::set_thresholds() {
   const auto least_of = [](float a, float b) { return a < b ? a : b; };
   const auto greatest_of = [](float a, float b) { return a > b ? a : b; };
   const auto sum_of = [](float a, float b) { return a + b; };
   combine_3x3(least_, stride_, least_of, across_, low_);
   combine_3x3(greatest_, stride_, greatest_of, across_, high_);
+  combine_3x3(saturated_, stride_, sum_of, across_, clipped_);
   midway_.assign(least_.size(), 0);
   for (int row = 1; row <= rows_; ++row) {
     for (int i = row * stride_ + 1; i <= row * stride_ + columns_; ++i) {
       const float contrast = high_[i] - low_[i];
-      const float midway = low_[i] + options_.level * contrast;
+      float midway = low_[i] + options_.level * contrast;
+      if (clipped_[i] > 9 * kSaturatedFirst) {
+        const float rise = std::min(1.F, (clipped_[i] / 9 - kSaturatedFirst) / (kSaturatedMost - kSaturatedFirst)),
+                    highest = std::min(low_[i] + kSaturatedLevel * contrast,
+                                       high_[i] - options_.contrast_min_sigma / 3 * noise_.at(high_[i]));
+        midway += rise * std::max(0.F, highest - midway);
+      }
       const float needed = contrast_min(midway);
       const float nothing_lit = high_[i] + needed;
       midway_[i] = contrast < needed ? nothing_lit : midway;
@@ -157,7 +184,7 @@ void Binarizer::set_thresholds(float greatest) {
     const int tall = 3 - (row == 1) - (row == rows_);
     float* threshold = threshold_.data() + row * stride_;
     const auto mean = [&](int column, int wide) {
-      threshold[column] = std::min(threshold[column] / static_cast<float>(tall * wide), greatest);
+      threshold[column] = std::min(threshold[column] / static_cast<float>(tall * wide), full_);
     };
     for (int column = 2; column < columns_; ++column) mean(column, 3);
     mean(1, columns_ == 1 ? 1 : 2);
@@ -185,7 +212,8 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, std::optiona
   rows_ = (frame.height + options_.tile_px - 1) / options_.tile_px;
   stride_ = columns_ + 2;
   least_.assign(static_cast<std::size_t>(stride_) * (rows_ + 2), std::numeric_limits<float>::max());
-  greatest_.assign(least_.size(), 0);
+  greatest_.assign(least_.size(), 0), saturated_.assign(least_.size(), 0);
+  full_ = static_cast<float>(full);
   if (buffers_.size() < static_cast<std::size_t>(executor.workers())) buffers_.resize(executor.workers());
   executor.run(1 + (rows_ + kTileRows - 1) / kTileRows, [&](int part, int worker) {
     if (part == 0) {
@@ -196,7 +224,7 @@ void Binarizer::binarize_as(const ImageView<T>& frame, double full, std::optiona
       find_extremes(frame, row, std::get<RowBuffers<T>>(buffers_[worker].rows));
   });
   contrast_floor_ = static_cast<float>(options_.contrast_min * full / 255);
-  set_thresholds(static_cast<float>(full));
+  set_thresholds();
   executor.run(1 + (frame.height + kRows - 1) / kRows, [&](int part, int worker) {
     Buffers& buffers = buffers_[worker];
     if (part == 0) {

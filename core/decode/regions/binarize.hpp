@@ -30,7 +30,8 @@ struct BinarizeOptions {
 };
 
 /// Separates lit from dark by a local threshold, midway between the least and the greatest grey value around each pixel
-/// and interpolated between tiles. Unlike one global threshold, it follows light that falls off over the frame.
+/// and interpolated between tiles. Unlike one global threshold, it follows light that falls off over the frame. If the
+/// symbols are saturated, their light lies beyond the full level, and the threshold is near that level.
 /// @thread thread-bound: keeps its buffers
 class Binarizer {
  public:
@@ -74,7 +75,9 @@ class Binarizer {
                    Executor& executor);
   template <class T>
   void find_extremes(const ImageView<T>& frame, int row, RowBuffers<T>& buffers);
-  void set_thresholds(float greatest);
+  template <class T>
+  [[nodiscard]] float saturated_share(const ImageView<T>& frame, int left, int top) const;
+  void set_thresholds();
   [[nodiscard]] float measure_usual_contrast();
   template <class T>
   [[nodiscard]] float measure_edge_blur(const ImageView<T>& frame, std::vector<T>& steepest);
@@ -88,7 +91,8 @@ class Binarizer {
   float contrast_floor_ = 0, edge_blur_px_ = 0, usual_contrast_sigma_ = 0;
   int columns_ = 0, rows_ = 0;  // number of tiles
   int stride_ = 0;              // columns of the tiles with a border of one all round
-  std::vector<float> least_, greatest_, across_, low_, high_, midway_, threshold_;
+  float full_ = 255;            // the level of a saturated pixel
+  std::vector<float> least_, greatest_, saturated_, across_, low_, high_, clipped_, midway_, threshold_;
   std::vector<float> steepness_, contrasts_;
   std::vector<Buffers> buffers_;
 };

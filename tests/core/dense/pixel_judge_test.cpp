@@ -38,9 +38,7 @@ TEST(EvidenceTable, AtAnEdgeOfTheLightAPixelMayBeEither) {
 }
 
 TEST(EvidenceTable, SaturatedPixelMayBeAnyBrighter) {
-  const auto reckon = [](float expected, float full) {
-    return EvidenceTable::reckon(expected, full, 0, 0.02F, true);
-  };
+  const auto reckon = [](float expected, float full) { return EvidenceTable::reckon(expected, full, 0, 0.02F, true); };
   EXPECT_GT(reckon(1, 0.5F).against_another, 0.5);
   EXPECT_GT(reckon(1, 0.5F).against_unlit, 2);
   EXPECT_NEAR(reckon(1, 0.5F).against_another, reckon(0.8F, 0.5F).against_another, 0.05);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -94,6 +95,9 @@ class PlainThresholds {
   [[nodiscard]] double midway(const Grey8& frame, int row, int column) const {
     const int tile = options_.tile_px;
     int low = 255, high = 0;
+    double saturated = 0;
+    for (int r = std::max(row - 1, 0); r <= row + 1; ++r)
+      for (int c = std::max(column - 1, 0); c <= column + 1; ++c) saturated += saturated_share(frame, r, c) / 9;
     for (int y = std::max((row - 1) * tile, 0); y < std::min((row + 2) * tile, frame.height()); ++y) {
       for (int x = std::max((column - 1) * tile, 0); x < std::min((column + 2) * tile, frame.width()); ++x) {
         low = std::min<int>(low, frame.at(x, y));
@@ -101,7 +105,16 @@ class PlainThresholds {
       }
     }
     if (high - low < options_.contrast_min) return high + options_.contrast_min;
-    return low + static_cast<double>(options_.level) * (high - low);
+    const double level = options_.level, rise = std::clamp((saturated - 0.05) / 0.15, 0., 1.);
+    return low + (level + rise * (0.95 - level)) * (high - low);
+  }
+  [[nodiscard]] double saturated_share(const Grey8& frame, int row, int column) const {
+    const int tile = options_.tile_px;
+    double saturated = 0, all = 0;
+    for (int y = row * tile; y < std::min((row + 1) * tile, frame.height()); ++y)
+      for (int x = column * tile; x < std::min((column + 1) * tile, frame.width()); ++x)
+        saturated += frame.at(x, y) == 255, ++all;
+    return all > 0 ? saturated / all : 0;
   }
   [[nodiscard]] double mean(int row, int column) const {
     row = std::min(row, rows_ - 1), column = std::min(column, columns_ - 1);
@@ -129,7 +142,7 @@ RC_GTEST_PROP(Binarize, ComparesWithThePlainFormula, ()) {
   // Steps of every height, flat stretches among them.
   int grey = 100;
   for (std::size_t i = 0; i < frame.size(); ++i) {
-    if (random() % 15 == 0) grey = random() % 3 == 0 ? 100 : static_cast<int>(random() % 256);
+    if (random() % 15 == 0) grey = random() % 3 == 0 ? 100 : std::min(255, static_cast<int>(random() % 320));
     frame.data()[i] = static_cast<std::uint8_t>(grey);
   }
   const Mask mask = binarize(frame.view(), options);
@@ -205,6 +218,42 @@ TEST(Binarize, FindsDimSquaresBesideNoisyLight) {
   for (int y = 0; y < frame.height(); ++y)
     for (int x = 600; x < frame.width(); ++x) wrong += mask.at(x, y) != in_square(x, y);
   EXPECT_LT(wrong, 100);
+}
+
+/// The blurred squares' light at a pixel, as a share of their middle's.
+double blurred_square(double sigma_px, int x, int y) {
+  const auto along = [&](int at) {
+    double light = 0;
+    for (int square = -1; square <= 1; ++square) {
+      const double from = at % 18 - 18 * square + 0.5, to = from - 12;
+      light +=
+          0.5 * (std::erf(from / (sigma_px * std::numbers::sqrt2)) - std::erf(to / (sigma_px * std::numbers::sqrt2)));
+    }
+    return light;
+  };
+  return along(x) * along(y);
+}
+
+TEST(Binarize, KeepsTheSizeOfSaturatedSquares) {
+  const auto lit_through = [](double white) {
+    Grey8 frame(360, 180);
+    for (int y = 0; y < frame.height(); ++y)
+      for (int x = 0; x < frame.width(); ++x)
+        frame.at(x, y) = static_cast<std::uint8_t>(std::min(255L, std::lround(10 + white * blurred_square(1.2, x, y))));
+    return count_lit(binarize(frame.view())) / (20. * 10);
+  };
+  const double unclipped = lit_through(200);
+  EXPECT_NEAR(unclipped, 12 * 12, 8);
+  for (const double white : {350, 700}) EXPECT_NEAR(lit_through(white), unclipped, 0.3 * unclipped) << white;
+}
+
+TEST(Binarize, GlintLeavesTheSquaresAroundIt) {
+  Grey8 frame(180, 180);
+  for (int y = 0; y < frame.height(); ++y)
+    for (int x = 0; x < frame.width(); ++x) frame.at(x, y) = in_square(x, y) ? 180 : 20;
+  for (int y = 90; y < 94; ++y)
+    for (int x = 90; x < 94; ++x) frame.at(x, y) = 255;
+  EXPECT_EQ(wrong_pixels(binarize(frame.view())), 0);
 }
 
 TEST(Binarize, ReadsFramesSmallerThanATile) {
