@@ -4,8 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
-#include <numbers>
+#include <span>
 #include <utility>
 
 #include "core/clones.hpp"
@@ -22,6 +23,13 @@ constexpr float kCleanSupport = 0.9F;
 /// none. Blur makes neighbours alike, some three pixels to an independent one, so this is a chance of one in a
 /// thousand.
 constexpr float kEvidenceMin = 20, kHalfMin = -3, kEnclosedHalfMin = -5;
+/// The same if the surface ends near the pixel: the evidence of one side, and of the pixel's own line, which is the
+/// side's border. Another surface that the line may show has to have less evidence by the margin there.
+constexpr float kSideMin = 14, kCornerMin = 10, kLineMin = 5, kLineMargin = 1;
+/// Evidence all around a pixel counts more than that of a side.
+constexpr float kAround = 1000;
+/// Planes that differ by more at a pixel are two surfaces, px.
+constexpr float kOtherPx = 0.5F;
 /// The same between nodes of one surface: nothing may contradict it.
 constexpr float kEnclosedMin = -2;
 /// Evidence of a single pixel above which it is firm: it is lit, as expected.
@@ -30,85 +38,6 @@ constexpr float kFirmMin = 2;
 constexpr float kEdgePx = 0.03F;
 /// Planes that differ by less at a cell are the same candidate, px.
 constexpr float kSamePx = 0.08F;
-
-// Model of a pixel's level on a surface, in units of its gain.
-constexpr float kMisfit = 0.04F;                               // of the dark: scattered light
-constexpr float kGainSpread = 0.12F;                           // of the light: print, relief
-constexpr float kPlaceSpread = 0.2F;                           // camera px
-constexpr float kOutliers = 0.05F;                             // share of the pixels
-constexpr float kLevels = 1.6F, kLevelsEnd = 1.3F;             // over which outliers are spread, and their end
-constexpr float kTailLeast = 0.02F;                            // share of the outliers beyond any level
-constexpr float kDark = 0.4F, kLit = 0.35F, kBetween = 0.25F;  // levels of a pixel on another surface
-
-float normal(float off, float sigma) {
-  return std::exp(-0.5F * off * off / (sigma * sigma)) / (sigma * std::sqrt(2 * std::numbers::pi_v<float>));
-}
-
-/// Integral of normal() above a level.
-float normal_above(float off, float sigma) {
-  return 0.5F * std::erfc(off / (sigma * std::numbers::sqrt2_v<float>));
-}
-
-std::uint32_t packed(const Evidence& evidence) {
-  const auto half = [](float log) {
-    const long steps = std::clamp(std::lround(log / EvidenceTable::kUnit), -32'767L, 32'767L);
-    return static_cast<std::uint32_t>(steps) & 0xffffU;
-  };
-  return half(evidence.against_another) << 16U | half(evidence.against_unlit);
-}
-
-Evidence unpacked(std::uint32_t entry) {
-  return {static_cast<float>(static_cast<std::int32_t>(entry) >> 16) * EvidenceTable::kUnit,
-          static_cast<float>(static_cast<std::int32_t>(entry << 16U) >> 16) * EvidenceTable::kUnit};
-}
-
-}  // namespace
-
-Evidence EvidenceTable::reckon(float expected, float seen, float slope, float noise, bool saturated) {
-  const auto square = [](float x) { return x * x; };
-  const auto sigma = [&](float light, float steep) {
-    return std::sqrt(square(noise) + square(kMisfit) + square(kGainSpread * light) + square(kPlaceSpread * steep));
-  };
-  const auto chance = [&](float light, float steep) {
-    const float off = seen - light, spread = sigma(light, steep);
-    return saturated ? normal_above(off, spread) : normal(off, spread);
-  };
-  const float outlier = saturated ? std::clamp((kLevelsEnd - seen) / kLevels, kTailLeast, 1.F) : 1 / kLevels;
-  const float here = (1 - kOutliers) * chance(expected, slope) + kOutliers * outlier;
-  const float dark = chance(0, 0);
-  const float another = kDark * dark + kLit * chance(1, 0) + kBetween * outlier;
-  const float unlit = (1 - kOutliers) * dark + kOutliers * outlier;
-  return {std::log(here / another), std::log(here / unlit)};
-}
-
-EvidenceTable::EvidenceTable() {
-  table_.reserve(2 * static_cast<std::size_t>(kOfLight) * kNoises);
-  for (int noise = 0; noise < kNoises; ++noise)
-    for (const bool saturated : {false, true})
-      for (int slope = 0; slope < kSlopes; ++slope)
-        for (int expected = 0; expected < kExpected; ++expected)
-          for (int seen = 0; seen < kSeen; ++seen)
-            table_.push_back(packed(reckon(
-                static_cast<float>(expected) / (kExpected - 1), kSeenFirst + kSeenStep * static_cast<float>(seen),
-                kSlopeStep * static_cast<float>(slope), kNoiseFirst * static_cast<float>(1 << noise), saturated)));
-}
-
-const std::uint32_t* EvidenceTable::entries(float noise) const {
-  int loud = 0;
-  for (float limit = 1.41F * kNoiseFirst; loud + 1 < kNoises && noise > limit; limit *= 2) ++loud;
-  return table_.data() + 2 * static_cast<std::ptrdiff_t>(loud) * kOfLight;
-}
-
-Evidence EvidenceTable::at(float expected, float seen, float slope, float noise, bool saturated) const {
-  const auto step = [](float value, int count) {
-    return static_cast<int>(std::clamp(value + 0.5F, 0.F, static_cast<float>(count - 1)));
-  };
-  const int row = step(slope / kSlopeStep, kSlopes) * kExpected + step(expected * (kExpected - 1), kExpected);
-  const int entry = row * kSeen + step((seen - kSeenFirst) / kSeenStep, kSeen);
-  return unpacked(entries(noise)[saturated ? kOfLight + entry : entry]);
-}
-
-namespace {
 
 using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
 
@@ -192,15 +121,43 @@ struct Summing {
   float of_half;          // added to the evidence of a half
 };
 
+/// Sums of evidence around a pixel: over all columns, those to the left and to the right with the own one, and the own
+/// one. Pairs of lanes: the whole height, the upper and the lower half with the own row, and the own row.
+struct AroundSums {
+  Lanes all, left, right, column;
+};
+enum AroundRows { kWhole = 0, kUpper = 2, kLower = 4, kRow = 6 };
+
+inline __attribute__((always_inline)) void split_sides(const AroundSums& in, const Evidence& own, SideEvidence& to) {
+  const auto pair = [](const Lanes& sums, int rows) { return Evidence{sums[rows], sums[rows + 1]}; };
+  to.side = {pair(in.left, kWhole), pair(in.right, kWhole), pair(in.all, kUpper),  pair(in.all, kLower),
+             pair(in.left, kUpper), pair(in.right, kUpper), pair(in.left, kLower), pair(in.right, kLower)};
+  const auto corner = [&](const Lanes& half, int rows) {
+    Evidence line = pair(half, kRow);
+    line += pair(in.column, rows), line -= own;
+    return line;
+  };
+  const Evidence column = pair(in.column, kWhole), row = pair(in.all, kRow);
+  to.line = {column,
+             column,
+             row,
+             row,
+             corner(in.left, kUpper),
+             corner(in.right, kUpper),
+             corner(in.left, kLower),
+             corner(in.right, kLower)};
+}
+
 /// Finds the least evidence around each pixel of a cell: of the whole surroundings, and of the half on each side. The
 /// pixel's own line is in both halves. A surface that continues on one side alone ends here, or earlier.
 /// @param evidence  two numbers for each of side x side pixels
 /// @param columns   buffer for 8 (side + 1) numbers
+/// @param sides     one for each pixel of the cell; null if not needed
 inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const float* evidence, float* columns,
-                                                     float* least, float* own) {
+                                                     float* least, float* own, SideEvidence* sides) {
   const int side = in.side, reach = in.reach;
   for (int y = 0; y < in.cell; ++y) {
-    // Sums over columns, of the whole and of its upper and lower half, then added along the row.
+    // Sums over columns, of the whole, of its upper and lower half, and of the row itself, then added along the row.
     Lanes total{};
     std::memcpy(columns, &total, sizeof total);
     for (int x = 0; x < side; ++x) {
@@ -215,8 +172,8 @@ inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const fl
                             above[1] + at[1],
                             at[0] + below[0],
                             at[1] + below[1],
-                            0,
-                            0};
+                            at[0],
+                            at[1]};
       total += column;
       std::memcpy(columns + 8 * (x + 1), &total, sizeof total);
     }
@@ -229,7 +186,10 @@ inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const fl
       const float halves = std::min(std::min(std::min(all[2], all[3]), std::min(all[4], all[5])),
                                     std::min(std::min(left[0], left[1]), std::min(right[0], right[1])));
       least[y * in.cell + x] = std::min(whole, halves + in.of_half);
-      own[y * in.cell + x] = evidence[2 * ((y + reach) * side + x + reach) + 1];
+      const float* const here = evidence + 2 * ((y + reach) * side + x + reach);
+      own[y * in.cell + x] = here[1];
+      if (sides != nullptr)
+        split_sides({all, left, right, behind - before}, {here[0], here[1]}, sides[y * in.cell + x]);
     }
   }
 }
@@ -448,10 +408,66 @@ void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate,
                         enclosed ? kEnclosedMin - kEnclosedHalfMin : kEvidenceMin - kHalfMin};
   const int at = std::max(as, 0);
   Cloned<sum_lanes>::call(summing, scratch.evidence.data(), scratch.sums.data(), scratch.least[at].data(),
-                          scratch.own[at].data());
+                          scratch.own[at].data(), enclosed ? nullptr : scratch.sides[at].data());
 }
 
-/// Chooses for each pixel the plane with the most evidence.
+int SideEvidence::most() const {
+  int best = -1;
+  for (int k = 0; k < kSides; ++k) {
+    if (side[k].least() < (k < kHalves ? kSideMin : kCornerMin) || line[k].least() < kLineMin) continue;
+    if (best < 0 || side[k].least() > side[best].least()) best = k;
+  }
+  return best;
+}
+
+namespace {
+
+/// A plane's claim on a pixel.
+struct Claim {
+  float inverse_depth, per_px;
+  float strength;  ///< of its evidence all around, or else on one side; 0 if neither is enough
+  int side;        ///< the side with the most evidence; -1 if none has enough
+  const SideEvidence* evidence;
+
+  [[nodiscard]] bool is_of_another_surface(const Claim& other) const {
+    return std::abs(other.inverse_depth - inverse_depth) > kOtherPx * other.per_px;
+  }
+  /// Tells whether the pixel's own line shows this plane rather than the other.
+  [[nodiscard]] bool wins(const Claim& other) const {
+    const auto on_line = [](const Claim& claim, int at) { return claim.evidence->line[at].against_another; };
+    return std::ranges::all_of(std::array{side, other.side}, [&](int at) {
+      return at < 0 || on_line(*this, at) >= on_line(other, at) + kLineMargin;
+    });
+  }
+};
+
+}  // namespace
+
+/// The plane with the strongest claim that no other surface's claim contests; -1 if there is none.
+int PixelJudge::choose_plane(const Cell& cell, const Scratch& scratch, int x, int y) const {
+  const int at = (y - cell.top) * cell.grid.stride_px() + x - cell.left;
+  std::array<Claim, kCandidates> all;
+  for (int k = 0; k < cell.count; ++k) {
+    const SideEvidence& evidence = scratch.sides[k][at];
+    const float around = scratch.least[k][at];
+    const int side = evidence.most();
+    const float strength = around >= kEvidenceMin ? kAround + around : side >= 0 ? evidence.side[side].least() : 0;
+    all[k] = {cell.value(k, static_cast<float>(x), static_cast<float>(y)), cell.candidates[k]->per_px, strength, side,
+              &evidence};
+  }
+  const std::span claims = std::span(all).first(cell.count);
+  int chosen = -1;
+  for (int k = 0; k < cell.count; ++k) {
+    if (!(claims[k].strength > (chosen < 0 ? 0 : claims[chosen].strength))) continue;
+    const bool contested = std::ranges::any_of(claims, [&](const Claim& other) {
+      return other.strength > 0 && claims[k].is_of_another_surface(other) && !claims[k].wins(other);
+    });
+    if (!contested) chosen = k;
+  }
+  return chosen;
+}
+
+/// Chooses a plane for each pixel.
 void PixelJudge::choose(const Cell& cell, const Scratch& scratch) const {
   const int stride = cell.grid.stride_px();
   const auto depth_min = static_cast<float>(options_.depth_min_mm),
@@ -459,12 +475,9 @@ void PixelJudge::choose(const Cell& cell, const Scratch& scratch) const {
   const auto of_full = static_cast<float>(255 / cell.frame.full);
   for (int y = cell.top; y < cell.bottom; ++y) {
     for (int x = cell.left; x < cell.right; ++x) {
-      const int at = (y - cell.top) * stride + x - cell.left;
-      int best = 0;
-      for (int k = 1; k < cell.count; ++k)
-        if (scratch.least[k][at] > scratch.least[best][at]) best = k;
+      const int at = (y - cell.top) * stride + x - cell.left, best = choose_plane(cell, scratch, x, y);
       const std::size_t pixel = cell.pixel(x, y);
-      if (scratch.least[best][at] < kEvidenceMin) {
+      if (best < 0) {
         cell.map.pixels[pixel] = DensePixel::kNoSupport;
         continue;
       }
@@ -524,6 +537,7 @@ void PixelJudge::resize(int stride_px, int workers) {
     for (int k = 0; k < kCandidates; ++k) {
       scratch.least[k].assign(static_cast<std::size_t>(stride_px) * stride_px, 0);
       scratch.own[k] = scratch.least[k];
+      scratch.sides[k].resize(scratch.least[k].size());
     }
   }
 }

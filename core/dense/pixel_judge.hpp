@@ -3,64 +3,30 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "core/appearance/pattern_field.hpp"
 #include "core/dense/dense_map.hpp"
+#include "core/dense/evidence_table.hpp"
 #include "core/dense/surface_grid.hpp"
 
 namespace slsd {
 
-/// Evidence of a pixel for a surface against two alternatives: another surface, on which dark and light are equally
-/// likely, and an unlit one. Each is the natural logarithm of how much likelier the pixel's level is.
-struct Evidence {
-  float against_another = 0, against_unlit = 0;
+/// Evidence on each side of a pixel: left, right, above, below, and toward the four corners. A surface that ends near
+/// the pixel has evidence on one side alone.
+struct SideEvidence {
+  static constexpr int kSides = 8, kHalves = 4;
+  std::array<Evidence, kSides> side;  ///< of that half or quarter of the surroundings, the pixel's own line included
+  std::array<Evidence, kSides> line;  ///< of the own line alone: the pixels along that side's border
 
-  [[nodiscard]] float least() const { return against_another < against_unlit ? against_another : against_unlit; }
-  Evidence& operator+=(const Evidence& more) {
-    against_another += more.against_another, against_unlit += more.against_unlit;
-    return *this;
-  }
-  Evidence& operator-=(const Evidence& less) {
-    against_another -= less.against_another, against_unlit -= less.against_unlit;
-    return *this;
-  }
-};
-
-/// Precomputed evidence, by a pixel's expected and observed light, the slope of the light and the noise. All are in
-/// units of the gain. The light of a saturated pixel is that of the full level or more.
-/// @thread reentrant
-class EvidenceTable {
- public:
-  EvidenceTable();
-  /// @param expected  0 to 1
-  /// @param seen      0 for dark, 1 for lit
-  /// @param slope     slope of the light, for one camera px
-  /// @param noise     one standard deviation of a pixel
-  /// @param saturated  the light is seen or more
-  [[nodiscard]] Evidence at(float expected, float seen, float slope, float noise, bool saturated = false) const;
-
-  /// Returns the table for a noise: kSeen entries to a row, kExpected rows to a slope; then the same for saturated
-  /// pixels. The upper half of each entry is the evidence against another surface, the lower against none, both signed
-  /// and in steps of kUnit.
-  [[nodiscard]] const std::uint32_t* entries(float noise) const;
-
-  static constexpr float kUnit = 1.F / 1024;
-  static constexpr int kExpected = 17, kSeen = 48, kSlopes = 4, kNoises = 6;
-  static constexpr int kOfLight = kExpected * kSeen * kSlopes;  ///< number of entries before those of saturated pixels
-  static constexpr float kSeenFirst = -0.5F, kSeenStep = 0.05F, kSlopeStep = 0.1F, kNoiseFirst = 0.01F;
-
-  /// The same, computed without the table.
-  [[nodiscard]] static Evidence reckon(float expected, float seen, float slope, float noise, bool saturated = false);
-
- private:
-  std::vector<std::uint32_t> table_;
+  /// The side with the most evidence for the surface; -1 if none has enough.
+  [[nodiscard]] int most() const;
 };
 
 /// Assigns each camera pixel a surface between the grid's nodes. If the nodes are one surface and all pixels agree, it
 /// is a blend of their planes. Otherwise each pixel gets the nearby plane that its surroundings support most, if they
-/// support any.
+/// support any. At an edge, each of two surfaces keeps its own pixels: those on its side that fit it better than the
+/// other.
 /// @thread thread-bound: keeps its buffers
 class PixelJudge {
  public:
@@ -78,6 +44,7 @@ class PixelJudge {
   static constexpr int kCandidates = 6;
   struct Scratch {
     std::vector<float> seen, evidence, sums, least[kCandidates], own[kCandidates];
+    std::vector<SideEvidence> sides[kCandidates];
   };
   struct Cell;
   void resize(int stride_px, int workers);
@@ -86,6 +53,7 @@ class PixelJudge {
   void see(const Cell& cell, Scratch& scratch) const;
   void weigh(const Cell& cell, const SurfaceNode& node, int candidate, int as, Scratch& scratch) const;
   void choose(const Cell& cell, const Scratch& scratch) const;
+  [[nodiscard]] int choose_plane(const Cell& cell, const Scratch& scratch, int x, int y) const;
 
   Options options_;
   EvidenceTable table_;
