@@ -20,6 +20,7 @@ constexpr double kContrastToNoiseMin = 8.0;
 constexpr double kUnevenMax = 20.0;
 constexpr double kMovedMax = 0.05;
 constexpr double kFlickerMax = 0.03;
+constexpr double kGrainMax = 0.2;  // a plain sensor has 0
 
 double ratio_of(double gain_db) {
   return std::pow(10.0, gain_db / 20.0);
@@ -38,18 +39,23 @@ double wanted_change(const LightLevels& levels) {
 }
 
 // Troubles visible in the frames themselves, whatever the setting.
-void find_troubles(const LightLevels& levels, const std::optional<FrameChange>& change,
-                   std::vector<Trouble>& troubles) {
+void find_troubles(const FrameLight& light, std::vector<Trouble>& troubles) {
+  const LightLevels& levels = light.levels;
+  const auto& change = light.change;
   const auto note = [&](bool found, Trouble trouble) {
     if (found) troubles.push_back(trouble);
   };
   const bool clipped = levels.clipped_share > kMostlyClipped;
+  const bool flickers = change && std::max(change->flicker(), change->bands) > kFlickerMax;
+  note(levels.clipped_share > kClippedMax, Trouble::kClipped);
   note(!clipped && levels.dark > kDarkToLitMax * levels.lit, Trouble::kAmbient);
   note(levels.edge_px > kEdgeToPeriodMax * levels.period_px, Trouble::kBlurred);
   note(change && levels.contrast() < kContrastToNoiseMin * change->noise, Trouble::kNoisy);
   note(levels.lit_brightest > kUnevenMax * std::max(levels.lit_faintest, 1.0), Trouble::kUneven);
   note(change && change->moved_share > kMovedMax, Trouble::kMoves);
-  note(change && change->flicker() > kFlickerMax, Trouble::kFlickers);
+  note(flickers, light.exposure_is_configured ? Trouble::kFlickers : Trouble::kAutomaticExposure);
+  note(!flickers && light.between.neighbours > kGrainMax, Trouble::kGrain);
+  note(!flickers && light.gamma && light.gamma->bends(), Trouble::kGamma);
 }
 
 double choose_exposure(double ideal_us, bool shortest, const ExposureLimits& limits) {
@@ -99,6 +105,14 @@ std::string_view to_string(Trouble trouble) {
       return "moves";
     case Trouble::kFlickers:
       return "flickers";
+    case Trouble::kClipped:
+      return "clipped";
+    case Trouble::kGrain:
+      return "grain";
+    case Trouble::kGamma:
+      return "gamma";
+    case Trouble::kAutomaticExposure:
+      return "automatic_exposure";
   }
   return {};
 }
@@ -130,20 +144,33 @@ std::string_view remedy(Trouble trouble) {
     case Trouble::kFlickers:
       return "the brightness flickers from frame to frame: expose for whole periods of the projector and the lamps, "
              "and check [projector] refresh_hz and [scan] power_line_hz";
+    case Trouble::kClipped:
+      return "symbols are clipped, by an unknown amount: set what slsctl exposure proposes, or dim the projector, and "
+             "run it "
+             "again";
+    case Trouble::kGrain:
+      return "neighbouring pixels share their noise, as compression and denoising leave it: choose an uncompressed "
+             "format, and turn the camera's denoising and sharpening off";
+    case Trouble::kGamma:
+      return "the grey levels are not proportional to light: set the camera's gamma to 1, and turn off contrast and "
+             "tone corrections";
+    case Trouble::kAutomaticExposure:
+      return "the brightness changes from frame to frame, and no exposure is configured: set exposure_us of this "
+             "[[camera]], so that the camera does not choose it itself";
   }
   return {};
 }
 
-ExposureAdvice advise_exposure(const LightLevels& levels, const std::optional<FrameChange>& change,
-                               const std::optional<ExposureSetting>& present, const ExposureLimits& limits) {
+ExposureAdvice advise_exposure(const FrameLight& light, const std::optional<ExposureSetting>& present,
+                               const ExposureLimits& limits) {
   ExposureAdvice advice;
-  if (levels.patterned_share < kPatternedMin) {
+  if (light.levels.patterned_share < kPatternedMin) {
     advice.troubles.push_back(Trouble::kNoPattern);
     return advice;
   }
-  advice.brighter = wanted_change(levels);
-  advice.look_again = levels.clipped_share > kClippedMax;
-  find_troubles(levels, change, advice.troubles);
+  advice.brighter = wanted_change(light.levels);
+  advice.look_again = light.levels.clipped_share > kClippedMax;
+  find_troubles(light, advice.troubles);
   if (present) advice.setting = choose_setting(*present, limits, advice);
   return advice;
 }

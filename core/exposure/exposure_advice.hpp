@@ -6,24 +6,28 @@
 #include <string_view>
 #include <vector>
 
-#include "core/exposure/frame_change.hpp"
-#include "core/exposure/light_levels.hpp"
+#include "core/exposure/frame_light.hpp"
 #include "core/exposure/light_periods.hpp"
 
 namespace slsd {
 
-/// Troubles that no other exposure or gain can fix.
+/// Troubles with the light in a camera's frames.
 enum class Trouble {
-  kNoPattern,       ///< the pattern is not visible
-  kTooMuchLight,    ///< clipped even with the shortest exposure that suits the projector, and no gain
-  kTooLittleLight,  ///< dark even with the longest exposure and the highest gain allowed
-  kAmbient,         ///< between the symbols it is nearly as bright as on them
-  kBlurred,         ///< the symbols' edges run into one another
-  kNoisy,           ///< pixels change between frames nearly as much as the contrast of the symbols
-  kUneven,          ///< near parts are clipped, or far parts are dark: no exposure suits both
-  kMoves,           ///< the scene moves, so that a longer exposure blurs it
-  kFlickers,        ///< the brightness changes from frame to frame
+  kNoPattern,          ///< the pattern is not visible
+  kTooMuchLight,       ///< clipped even with the shortest exposure that suits the projector, and no gain
+  kTooLittleLight,     ///< dark even with the longest exposure and the highest gain allowed
+  kAmbient,            ///< between the symbols it is nearly as bright as on them
+  kBlurred,            ///< the symbols' edges run into one another
+  kNoisy,              ///< pixels change between frames nearly as much as the contrast of the symbols
+  kUneven,             ///< near parts are clipped, or far parts are dark: no exposure suits both
+  kMoves,              ///< the scene moves, so that a longer exposure blurs it
+  kFlickers,           ///< the brightness changes from frame to frame
+  kClipped,            ///< symbols are saturated, by an unknown amount
+  kGrain,              ///< neighbouring pixels share their noise, as compression and denoising leave it
+  kGamma,              ///< grey levels are not proportional to light
+  kAutomaticExposure,  ///< the brightness changes from frame to frame, and the exposure is not configured
 };
+inline constexpr int kTroubleCount = 13;
 
 /// "ambient", as in the JSON of slsctl exposure.
 [[nodiscard]] std::string_view to_string(Trouble trouble);
@@ -53,13 +57,10 @@ struct ExposureAdvice {
 /// Proposes exposure and gain with which the brightest symbols reach three quarters of full. It uses as little gain as
 /// possible, and an exposure of whole periods of the light. If the scene moves, it uses the shortest such exposure, and
 /// gain compensates for the rest.
-/// @param levels   levels of one frame
-/// @param change   change between two frames taken with the same setting; without it, noise, motion and flicker are
-///                 unknown
+/// @param light    of one frame, or of two taken with the same setting; of one, noise, motion and flicker are unknown
 /// @param present  the setting of those frames, if known
 /// @thread reentrant
-[[nodiscard]] ExposureAdvice advise_exposure(const LightLevels& levels, const std::optional<FrameChange>& change,
-                                             const std::optional<ExposureSetting>& present,
+[[nodiscard]] ExposureAdvice advise_exposure(const FrameLight& light, const std::optional<ExposureSetting>& present,
                                              const ExposureLimits& limits);
 
 }  // namespace slsd

@@ -5,11 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <initializer_list>
-#include <utility>
 #include <variant>
 #include <vector>
-
-#include "core/exposure/tile.hpp"
 
 namespace slsd {
 namespace {
@@ -17,21 +14,6 @@ namespace {
 constexpr double kFaintest = 0.05;
 constexpr double kBrightest = 0.95;
 constexpr double kClipped = 0.985;  // of full: noise and uneven sensor response keep some pixels below
-
-std::vector<TileLevels> measure_tiles(const GreyView& frame, double full, int& tiles) {
-  std::vector<TileLevels> seen;
-  Tile tile;
-  const auto [width, height] =
-      std::visit([](const auto& image) { return std::pair(image.width, image.height); }, frame);
-  for (int top = 0; top + kTilePx <= height; top += kTilePx) {
-    for (int left = 0; left + kTilePx <= width; left += kTilePx) {
-      ++tiles;
-      tile.take(frame, left, top);
-      if (const auto levels = tile.measure(full)) seen.push_back(*levels);
-    }
-  }
-  return seen;
-}
 
 /// The first number in a text; 0 if there is none.
 int first_number(std::string_view text) {
@@ -41,35 +23,43 @@ int first_number(std::string_view text) {
   return number;
 }
 
-double quantile(const std::vector<TileLevels>& tiles, double TileLevels::*level, double share) {
+double quantile(std::span<const PatternedTile> tiles, double TileLevels::*level, double share) {
   std::vector<double> values;
-  for (const TileLevels& tile : tiles) values.push_back(tile.*level);
+  for (const PatternedTile& tile : tiles) values.push_back(tile.levels.*level);
   std::ranges::sort(values);
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-double median(const std::vector<TileLevels>& tiles, double TileLevels::*level) {
+double median(std::span<const PatternedTile> tiles, double TileLevels::*level) {
   return quantile(tiles, level, 0.5);
 }
 
 }  // namespace
 
-LightLevels measure_light(const GreyView& frame, double full) {
+LightLevels summarize(std::span<const PatternedTile> tiles, int all, double full) {
   LightLevels levels;
   levels.full = full;
-  int tiles = 0;
-  const std::vector<TileLevels> seen = measure_tiles(frame, full, tiles);
-  if (seen.empty()) return levels;
-  const auto clipped = std::ranges::count_if(seen, [&](const TileLevels& tile) { return tile.lit >= kClipped * full; });
-  levels.dark = median(seen, &TileLevels::dark);
-  levels.lit = median(seen, &TileLevels::lit);
-  levels.lit_brightest = quantile(seen, &TileLevels::lit, kBrightest);
-  levels.lit_faintest = quantile(seen, &TileLevels::lit, kFaintest);
-  levels.clipped_share = static_cast<double>(clipped) / static_cast<double>(seen.size());
-  levels.edge_px = median(seen, &TileLevels::edge_px);
-  levels.period_px = median(seen, &TileLevels::period_px);
-  levels.patterned_share = static_cast<double>(seen.size()) / tiles;
+  if (tiles.empty()) return levels;
+  const auto clipped =
+      std::ranges::count_if(tiles, [&](const PatternedTile& tile) { return tile.levels.lit >= kClipped * full; });
+  double clipped_of_lit = 0;
+  for (const PatternedTile& tile : tiles) clipped_of_lit += tile.levels.clipped_of_lit;
+  levels.dark = median(tiles, &TileLevels::dark);
+  levels.lit = median(tiles, &TileLevels::lit);
+  levels.lit_brightest = quantile(tiles, &TileLevels::lit, kBrightest);
+  levels.lit_faintest = quantile(tiles, &TileLevels::lit, kFaintest);
+  levels.clipped_share = static_cast<double>(clipped) / static_cast<double>(tiles.size());
+  levels.clipped_of_lit = clipped_of_lit / static_cast<double>(tiles.size());
+  levels.edge_px = median(tiles, &TileLevels::edge_px);
+  levels.period_px = median(tiles, &TileLevels::period_px);
+  levels.patterned_share = static_cast<double>(tiles.size()) / all;
   return levels;
+}
+
+LightLevels measure_light(const GreyView& frame, double full) {
+  int all = 0;
+  const std::vector<PatternedTile> tiles = measure_tiles(frame, full, all);
+  return summarize(tiles, all, full);
 }
 
 double guess_full_level(const GreyView& frame) {

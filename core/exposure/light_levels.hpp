@@ -2,8 +2,10 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <span>
 #include <string_view>
 
+#include "core/exposure/tile.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -22,13 +24,21 @@ struct LightLevels {
   double lit_brightest = 0;    ///< level of the symbols in the brightest twentieth of the tiles
   double lit_faintest = 0;     ///< level of the symbols in the faintest twentieth
   double clipped_share = 0;    ///< share of the tiles whose symbols are clipped; 0 to 1
+  double clipped_of_lit = 0;   ///< share of the symbols' pixels that are saturated; 0 to 1
   double edge_px = 0;          ///< one standard deviation of the blur at the symbols' edges; a sharp edge has about 0.8
   double period_px = 0;        ///< distance from one symbol's edge to the next's on the same side, along rows
   double patterned_share = 0;  ///< share of the tiles in which the pattern is visible; 0 to 1. If it is 0, only `full`
                                ///< of the above is valid
 
   [[nodiscard]] double contrast() const { return lit - dark; }
+  /// Light between the symbols relative to the pattern's own.
+  [[nodiscard]] double room_light() const { return contrast() > 0 ? dark / contrast() : 0; }
 };
+
+/// Sums up the tiles of a frame.
+/// @param all  number of tiles, with those that show no pattern
+/// @thread reentrant
+[[nodiscard]] LightLevels summarize(std::span<const PatternedTile> tiles, int all, double full);
 
 /// Measures the visibility of the pattern tile by tile, 64 px wide. Needs no calibration and no decoder, so it works on
 /// frames that cannot be decoded.

@@ -61,6 +61,12 @@ double Tile::period_px(double middle) const {
   return rises == 0 ? kTilePx : static_cast<double>(kTilePx) * kTilePx / rises;
 }
 
+double Tile::clipped_of_lit(double middle, double full) const {
+  const auto lit = std::ranges::count_if(pixels_, [&](float level) { return level > middle; });
+  const auto clipped = std::ranges::count_if(pixels_, [&](float level) { return level >= full; });
+  return lit == 0 ? 0 : static_cast<double>(clipped) / static_cast<double>(lit);
+}
+
 std::optional<TileLevels> Tile::measure(double full) {
   TileLevels levels;
   levels.dark = quantile(kDarkShare);
@@ -73,7 +79,23 @@ std::optional<TileLevels> Tile::measure(double full) {
   // A step blurred by a Gaussian of sigma has its steepest slope, 1 / (sqrt(2 pi) sigma) of its height per pixel, at
   // the middle.
   levels.edge_px = 0.399 * contrast / steepest();
+  levels.clipped_of_lit = clipped_of_lit(middle, full);
   return levels;
+}
+
+std::vector<PatternedTile> measure_tiles(const GreyView& frame, double full, int& tiles) {
+  std::vector<PatternedTile> seen;
+  Tile tile;
+  const auto [width, height] = size_of(frame);
+  tiles = 0;
+  for (int top = 0; top + kTilePx <= height; top += kTilePx) {
+    for (int left = 0; left + kTilePx <= width; left += kTilePx) {
+      ++tiles;
+      tile.take(frame, left, top);
+      if (const auto levels = tile.measure(full)) seen.push_back({left, top, *levels});
+    }
+  }
+  return seen;
 }
 
 }  // namespace slsd

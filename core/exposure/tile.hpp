@@ -17,6 +17,15 @@ struct TileLevels {
   double lit = 0;
   double edge_px = 0;
   double period_px = 0;
+  double clipped_of_lit = 0;  ///< share of the pixels brighter than the middle between lit and dark that are saturated
+
+  [[nodiscard]] double room_light() const { return dark / (lit - dark); }
+};
+
+/// A tile in which the pattern is visible.
+struct PatternedTile {
+  int left = 0, top = 0;  ///< its first pixel
+  TileLevels levels;
 };
 
 /// One tile's pixels in floating point; the buffer is reused for the next tile.
@@ -35,9 +44,16 @@ class Tile {
   [[nodiscard]] double quantile(double share);
   [[nodiscard]] double steepest();
   [[nodiscard]] double period_px(double middle) const;
+  [[nodiscard]] double clipped_of_lit(double middle, double full) const;
 
   std::vector<float> pixels_;
   std::vector<float> room_;
 };
+
+/// Measures the tiles of a frame, row by row.
+/// @param tiles  set to the number of all tiles
+/// @return the tiles in which the pattern is visible
+/// @thread reentrant
+[[nodiscard]] std::vector<PatternedTile> measure_tiles(const GreyView& frame, double full, int& tiles);
 
 }  // namespace slsd

@@ -6,7 +6,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/core/exposure/corpus_frame.hpp"
+#include "tests/core/exposure/seen_by_camera.hpp"
 
 namespace slsd {
 namespace {
@@ -35,7 +35,7 @@ class CameraOf {
                                                                   const ExposureLimits& limits) const {
     ExposureAdvice advice;
     for (int looks = 0; looks < 6; ++looks) {
-      advice = advise_exposure(look(setting), std::nullopt, setting, limits);
+      advice = advise_exposure({.levels = look(setting)}, setting, limits);
       if (!advice.setting) break;
       setting = *advice.setting;
     }
@@ -68,7 +68,7 @@ INSTANTIATE_TEST_SUITE_P(AdviseExposure, Scenes,
 
 TEST(AdviseExposure, LeavesAGoodFrameAlone) {
   const LightLevels levels = measure_light(corpus_frame("16px-5-plane_30").view(), 255);
-  const ExposureAdvice advice = advise_exposure(levels, std::nullopt, ExposureSetting{kFrameUs, 0}, {});
+  const ExposureAdvice advice = advise_exposure({.levels = levels}, ExposureSetting{kFrameUs, 0}, {});
   EXPECT_EQ(advice.brighter, 1);
   EXPECT_THAT(advice.troubles, IsEmpty());
   ASSERT_TRUE(advice.setting);
@@ -108,7 +108,7 @@ TEST(AdviseExposure, ThinksOfTheLamps) {
 TEST(AdviseExposure, KeepsTheExposureShortWhereThingsMove) {
   const LightLevels levels = CameraOf("16px-5-plane_30", 0.2).look({kFrameUs, 0});
   const FrameChange moving{.noise = 1, .moved_share = 0.3, .brighter = 1};
-  const ExposureAdvice advice = advise_exposure(levels, moving, ExposureSetting{kFrameUs, 0}, {});
+  const ExposureAdvice advice = advise_exposure({.levels = levels, .change = moving}, ExposureSetting{kFrameUs, 0}, {});
   EXPECT_THAT(advice.troubles, ElementsAre(Trouble::kMoves));
   EXPECT_THAT(advice.setting->exposure_us, DoubleNear(kFrameUs, 1));
   EXPECT_THAT(advice.setting->gain_db, DoubleNear(13.3, 1.5));
@@ -117,7 +117,7 @@ TEST(AdviseExposure, KeepsTheExposureShortWhereThingsMove) {
 TEST(AdviseExposure, NamesWhatItCannotCorrect) {
   const Grey8 frame = corpus_frame("16px-5-plane_30");
   const auto troubles = [](const Grey8& image, const std::optional<FrameChange>& change = {}) {
-    return advise_exposure(measure_light(image.view(), 255), change, {}, {}).troubles;
+    return advise_exposure({.levels = measure_light(image.view(), 255), .change = change}, {}, {}).troubles;
   };
   EXPECT_THAT(troubles(exposed(frame, 0.5, 250)), ElementsAre(Trouble::kAmbient));
   EXPECT_THAT(troubles(blurred(frame, 1)), IsEmpty());
@@ -129,8 +129,36 @@ TEST(AdviseExposure, NamesWhatItCannotCorrect) {
   EXPECT_THAT(troubles(frame), IsEmpty());
 }
 
+TEST(AdviseExposure, NamesTheCamerasOwnTroubles) {
+  const Grey8 scene = corpus_frame("16px-5-plane_30");
+  const auto light_of = [&](const SimulatedCamera& camera, double brighter = 1) {
+    const Grey8 first = seen_by(camera, scene, 1);
+    return measure_frame_light(first.view(), exposed(seen_by(camera, scene, 2), brighter).view(), 255);
+  };
+  const auto troubles = [](const FrameLight& light) { return advise_exposure(light, {}, {}).troubles; };
+  EXPECT_THAT(troubles(light_of({})), IsEmpty());
+  EXPECT_THAT(troubles(light_of({.grain = 1})), ElementsAre(Trouble::kGrain));
+  EXPECT_THAT(troubles(light_of({.gamma = 0.65})), ElementsAre(Trouble::kGamma));
+  EXPECT_THAT(troubles(light_of({.gamma = 0.65, .grain = 1})), ElementsAre(Trouble::kGrain, Trouble::kGamma));
+  FrameLight darker = light_of({}, 0.8);
+  EXPECT_THAT(troubles(darker), ElementsAre(Trouble::kFlickers));
+  darker.exposure_is_configured = false;
+  EXPECT_THAT(troubles(darker), ElementsAre(Trouble::kAutomaticExposure));
+}
+
+TEST(AdviseExposure, NamesClippedSymbolsAndBands) {
+  const Grey8 frame = corpus_frame("16px-5-plane_30");
+  const auto clipped = advise_exposure({.levels = measure_light(exposed(frame, 4).view(), 255)}, {}, {});
+  EXPECT_THAT(clipped.troubles, ElementsAre(Trouble::kClipped));
+  EXPECT_TRUE(clipped.look_again);
+  FrameLight bands{.levels = measure_light(frame.view(), 255), .change = FrameChange{.bands = 0.05}};
+  EXPECT_THAT(advise_exposure(bands, {}, {}).troubles, ElementsAre(Trouble::kFlickers));
+  bands.between.neighbours = 0.5;  // of the lamps
+  EXPECT_THAT(advise_exposure(bands, {}, {}).troubles, ElementsAre(Trouble::kFlickers));
+}
+
 TEST(AdviseExposure, NamesEveryTrouble) {
-  for (int i = 0; i <= static_cast<int>(Trouble::kFlickers); ++i) {
+  for (int i = 0; i < kTroubleCount; ++i) {
     EXPECT_FALSE(to_string(static_cast<Trouble>(i)).empty());
     EXPECT_FALSE(remedy(static_cast<Trouble>(i)).empty());
   }
