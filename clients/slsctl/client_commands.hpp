@@ -27,6 +27,8 @@ struct Failure;
 [[nodiscard]] int exposure_command(const ClientOptions& options);
 /// Does the same and returns JSON, for other programs than slsctl.
 [[nodiscard]] tl::expected<nlohmann::json, Failure> look_at_exposure(const ClientOptions& options);
+/// Reports the light in frames of a camera under the pattern, or from files, and draws it.
+[[nodiscard]] int light_command(const ClientOptions& options);
 /// Prints the service's metrics, or writes them to a file, whole or not at all.
 [[nodiscard]] int metrics_command(const ClientOptions& options);
 /// Writes the last scans that the service kept, and prints the file's name.

@@ -24,22 +24,23 @@ struct ClientOptions {
   std::filesystem::path output;   ///< scan: the cloud; metrics, bundle: the file; empty: none
   std::string format;             ///< scan: the cloud's format, "ply", "pcd" or "tiff"; empty: from the file's name
   std::string metrics_format;     ///< metrics: "openmetrics" or "prometheus"; empty: depends on the destination
-  std::filesystem::path picture;  ///< scan: the frame with the decoded symbols
-  bool why = false;               ///< scan: the picture shows the rule that rejected each region
-  std::filesystem::path cloud_picture;    ///< scan: the cloud, drawn
-  std::filesystem::path image;            ///< preview, frame, pattern: the PNG to write
-  std::filesystem::path shown;            ///< project: a picture's name, or a file
-  std::string density;                    ///< scan, watch: "symbols" or "pixels"; empty: as configured
-  bool normals = false;                   ///< scan: normals of pixels
-  bool texture = false;                   ///< scan: intensities from a frame in white light
-  bool ambient = false;                   ///< scan: minus the room's light
-  bool as_shown = false;                  ///< frame: keep the projector's picture
-  std::filesystem::path folder;           ///< record: the destination
-  bool clouds = false;                    ///< record: the clouds too
-  std::optional<double> seconds;          ///< record: ends after this time
-  std::string camera;                     ///< exposure, frame, preview, scan: its name; empty: the first
-  std::optional<double> exposure_max_us;  ///< exposure: the longest to propose
-  std::optional<double> gain_max_db;      ///< exposure: the highest to propose
+  std::filesystem::path picture;  ///< scan: the frame with the decoded symbols; light: the frame with its light
+  std::vector<std::filesystem::path> from;  ///< light: one or two frames to read; empty: from the service
+  bool why = false;                         ///< scan: the picture shows the rule that rejected each region
+  std::filesystem::path cloud_picture;      ///< scan: the cloud, drawn
+  std::filesystem::path image;              ///< preview, frame, pattern: the PNG to write
+  std::filesystem::path shown;              ///< project: a picture's name, or a file
+  std::string density;                      ///< scan, watch: "symbols" or "pixels"; empty: as configured
+  bool normals = false;                     ///< scan: normals of pixels
+  bool texture = false;                     ///< scan: intensities from a frame in white light
+  bool ambient = false;                     ///< scan: minus the room's light
+  bool as_shown = false;                    ///< frame: keep the projector's picture
+  std::filesystem::path folder;             ///< record: the destination
+  bool clouds = false;                      ///< record: the clouds too
+  std::optional<double> seconds;            ///< record: ends after this time
+  std::string camera;                       ///< exposure, light, frame, preview, scan: its name; empty: the first
+  std::optional<double> exposure_max_us;    ///< exposure: the longest to propose
+  std::optional<double> gain_max_db;        ///< exposure: the highest to propose
   std::optional<int> timeout_ms;
   std::vector<std::string> assignments;  ///< set: "decode.density=pixels"
   std::string action = "begin";          ///< calibrate: this, or "look", "end" or "cancel"

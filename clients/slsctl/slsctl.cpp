@@ -177,6 +177,20 @@ void add_exposure(CLI::App& app, ClientOptions& options) {
   add_timeout(exposure, options);
 }
 
+void add_light(CLI::App& app, ClientOptions& options) {
+  CLI::App* light = add_command(app, kDiagnose, "light",
+                                "report the light in a camera's frames: blur, clipping, room light, noise, gamma",
+                                "  slsctl light\n  slsctl light --camera left --picture light.png\n");
+  CLI::Option* camera = light->add_option("--camera", options.camera, "which camera (the first)")->type_name("NAME");
+  light->add_option("--from", options.from, "read one or two frames from files, without the service")
+      ->expected(1, 2)
+      ->excludes(camera)
+      ->type_name("FRAME.png");
+  light->add_option("--picture", options.picture, "write the frame with clipping, room light and blur drawn in")
+      ->type_name("FILE.png");
+  add_timeout(light, options);
+}
+
 void add_project(CLI::App& app, ClientOptions& options) {
   CLI::App* project = add_command(app, kSetUp, "project", "project a picture until the next scan",
                                   "  slsctl project focus\n  slsctl project chart.png\n  slsctl project idle\n");
@@ -218,6 +232,7 @@ void add_commands(CLI::App& app, ClientOptions& options) {
   add_image(app, options, kDiagnose, "preview", "scan, and write the frame with the decoded symbols drawn in",
             "  slsctl preview decoded.png\n");
   add_image(app, options, kDiagnose, "pattern", "write the image of the pattern", "  slsctl pattern pattern.png\n");
+  add_light(app, options);
   add_bundle(app, options);
 }
 
@@ -232,6 +247,7 @@ int run(const std::string& command, const ClientOptions& options) {
   if (command == "calibrate") return slsd::calibrate_command(options);
   if (command == "top") return slsd::top_command(options);
   if (command == "exposure") return slsd::exposure_command(options);
+  if (command == "light") return slsd::light_command(options);
   if (command == "project") return slsd::project_command(options);
   if (command == "record") return slsd::record_command(options);
   return slsd::image_command(options, command);

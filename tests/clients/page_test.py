@@ -13,6 +13,7 @@ import unittest
 from browser import Browser, is_there
 from page_service import TOKEN, Web, resident_mib
 from calibrate_test import BOARD, stage
+from command_line_test import write_clipped
 from gige_double import Double, service_on
 from point_cloud import vertices
 from service import Service, wait_until
@@ -166,6 +167,17 @@ class Views(unittest.TestCase):
             browser.picture(self.folder / "calibrated-390.png")
             browser.wait("document.getElementById('state').textContent === 'Ready to scan.'", "not ready")
             self.assertEqual(browser.complaints(), [])
+
+    def test_a_proposal_names_the_troubles_of_the_light(self):
+        with tempfile.TemporaryDirectory(prefix="slsd-test-") as folder:
+            clipped = write_clipped(pathlib.Path(folder) / "clipped.pgm")
+            with Service(camera_path=clipped) as service, Web(service) as web, Browser() as browser:
+                service.wait_ready()
+                browser.resize(1600, 1100)
+                browser.open(web.address)
+                browser.wait("document.getElementById('which-camera').value === 'camera'", "no camera")
+                browser.click("#propose")
+                browser.wait("/symbols are clipped/.test(document.getElementById('exposure').textContent)", "no trouble")
 
     def test_an_exposure_is_taken_and_one_that_the_camera_refuses_is_not(self):
         double = Double()

@@ -280,8 +280,15 @@ class Slsd(unittest.TestCase):
         self.assertRegex(result.stdout, "(?s)no-such-camera.*No such file.*(found with this driver|no other camera of this driver)")
 
 
-COMMANDS = {"scan", "record", "status", "watch", "top", "metrics", "calibrate", "exposure", "project", "frame", "set", "settings",
+COMMANDS = {"scan", "record", "status", "watch", "top", "metrics", "calibrate", "exposure", "light", "project", "frame", "set", "settings",
             "preview", "pattern", "bundle"}
+
+
+def write_clipped(file):
+    """A camera's image of a pattern with saturated symbols."""
+    rows = [bytes(255 if x % 16 < 8 and y % 16 < 8 else 20 for x in range(640)) for y in range(16)]
+    file.write_bytes(b"P5 640 480 255\n" + b"".join(rows[y % 16] for y in range(480)))
+    return file
 
 
 class Usage(unittest.TestCase):
@@ -579,6 +586,46 @@ class Slsctl(unittest.TestCase):
         self.assertEqual(self.slsctl("exposure", "--gain-max-db", "-1").returncode, 2)
         with Service(camera_path=SCENE / "black.png") as dark:
             self.assertIn("no_pattern: ", slsctl("--socket", dark.socket, "exposure").stdout)
+
+    def test_light_reports_in_numbers_and_as_a_picture(self):
+        picture = self.folder / "light.png"
+        seen = json.loads(self.slsctl("--json", "light", "--camera", "camera", "--picture", picture).stdout)
+        self.assertEqual(picture.read_bytes()[:4], b"\x89PNG")
+        self.assertEqual((seen["camera"], seen["full"], seen["troubles"]), ("camera", 255, []))
+        self.assertEqual(seen["change"], {"noise": 0, "moved_share": 0, "brighter": 1, "bands": 0})
+        self.assertEqual((seen["grain"], seen["gamma"]), (None, None), "measured without noise")
+        self.assertLess(0.5, seen["edge_px"])
+        self.assertLess(seen["edge_px"], 0.075 * seen["period_px"])
+        self.assertLess(seen["room_light"], 0.5)
+        self.assertEqual(seen["clipped_of_lit"], 0)
+        told = self.slsctl("light").stdout
+        for line in ("blur   ", "clipped   ", "room light   ", "noise   ", "grain   ", "gamma   ", "change   "):
+            self.assertIn("\n" + line, told)
+
+    def test_light_reads_files_without_a_service(self):
+        frame, none = SCENE / "frame.png", self.folder / "none"
+        seen = json.loads(slsctl("--socket", none, "--json", "light", "--from", frame).stdout)
+        self.assertEqual((seen["camera"], seen["change"], seen["troubles"]), ("", None, []))
+        clipped = write_clipped(self.folder / "clipped.pgm")
+        seen = json.loads(slsctl("--socket", none, "--json", "light", "--from", clipped, clipped).stdout)
+        self.assertEqual([trouble["name"] for trouble in seen["troubles"]], ["clipped"])
+        self.assertAlmostEqual(seen["clipped_of_lit"], 1)
+        small = self.folder / "small.pgm"
+        small.write_bytes(b"P5 64 64 255\n" + bytes(64 * 64))
+        self.assertIn("no_pattern: ", slsctl("light", "--from", small).stdout)
+        self.assertIn("64x64 pixels of 8 bits, the other 640x480", slsctl("light", "--from", clipped, small).stderr)
+        self.assertEqual(slsctl("light", "--from", clipped, small).returncode, 1)
+        self.assertIn("missing.png", slsctl("light", "--from", self.folder / "missing.png").stderr)
+        for usage in (["--from", frame, "--camera", "camera"], ["--picture", "light.jpg"], ["--from"]):
+            self.assertEqual(slsctl("light", *usage).returncode, 2, usage)
+
+    def test_exposure_and_light_name_the_same_troubles(self):
+        with Service(camera_path=write_clipped(self.folder / "clipped.pgm")) as service:
+            told = [json.loads(slsctl("--socket", service.socket, "--json", command).stdout)["troubles"]
+                    for command in ("exposure", "light")]
+            self.assertEqual([trouble["name"] for trouble in told[0]], ["clipped"])
+            self.assertEqual(told[0], told[1])
+            self.assertIn(told[0][0]["remedy"], slsctl("--socket", service.socket, "exposure").stdout)
 
     def test_status_and_watch_read_well(self):
         self.assertIn("camera      ready, file", self.slsctl("status").stdout)
