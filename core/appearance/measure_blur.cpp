@@ -12,6 +12,9 @@ namespace {
 
 using Row = Eigen::Matrix<float, kFitted, 1>;
 
+/// Share of an unknown's square sum that the other unknowns have to leave.
+constexpr float kKnownMin = 1e-3F;
+
 /// Half the Laplacian of the pattern, from the field's slopes.
 float half_laplacian(const PatternField& field, float u, float v) {
   constexpr float kOff = 1.F / PatternField::kSamplesPerPx;
@@ -20,12 +23,26 @@ float half_laplacian(const PatternField& field, float u, float v) {
   return 0.5F * (along_u + along_v) / (2 * kOff);
 }
 
-/// Normal equations of a patch, with the change of the blur beside the other unknowns.
+/// Changes of the blur and of the tone curve.
+constexpr int kChanges = 2;
+enum Change { kOfBlur, kOfTone };
+using Changes = Eigen::Matrix<float, kChanges, 1>;
+
+/// Normal equations of a patch, with the changes beside the other unknowns.
 struct Sums {
   Eigen::Matrix<float, kFitted, kFitted> normal = Eigen::Matrix<float, kFitted, kFitted>::Zero();
-  Row right = Row::Zero(), with_blur = Row::Zero();
-  float blur_blur = 0, blur_right = 0;
+  Row right = Row::Zero();
+  Eigen::Matrix<float, kFitted, kChanges> with_changes = Eigen::Matrix<float, kFitted, kChanges>::Zero();
+  Eigen::Matrix<float, kChanges, kChanges> changes = Eigen::Matrix<float, kChanges, kChanges>::Zero();
+  Changes changes_right = Changes::Zero();
 };
+
+/// Change of a level with the power of the tone curve, from a power of one.
+float by_tone(float level, float full) {
+  constexpr float kDarkest = 1e-3F;
+  const float light = std::clamp(level / full, kDarkest, 1.F);
+  return full * light * std::log(light);
+}
 
 template <class T>
 Sums sum_up(const ImageView<T>& frame, double full, const PatternField& field, const AlignOptions& options,
@@ -55,13 +72,14 @@ Sums sum_up(const ImageView<T>& frame, double full, const PatternField& field, c
       const float off_scale = residual * per_scale, agrees = 1 / (1 + off_scale * off_scale);
       weight *= agrees * agrees;
       const float g = gain * (light.slope_u * map.along.x() + light.slope_v * map.along.y()),
-                  c = gain * (light.slope_v * map.along.x() - light.slope_u * map.along.y()),
-                  by_blur = gain * half_laplacian(field, p.x(), p.y());
+                  c = gain * (light.slope_v * map.along.x() - light.slope_u * map.along.y());
+      const Changes by(gain * half_laplacian(field, p.x(), p.y()),
+                       by_tone(state.offset + gain * light.value, static_cast<float>(full)));
       Row row;
       row << g, g * off.x(), g * off.y(), c, light.value, light.value * off.x(), light.value * off.y(), 1;
       sums.normal += weight * row * row.transpose();
-      sums.right += weight * residual * row, sums.with_blur += weight * by_blur * row;
-      sums.blur_blur += weight * by_blur * by_blur, sums.blur_right += weight * by_blur * residual;
+      sums.right += weight * residual * row, sums.with_changes += weight * row * by.transpose();
+      sums.changes += weight * by * by.transpose(), sums.changes_right += weight * residual * by;
     }
   }
   return sums;
@@ -75,20 +93,26 @@ void BlurMeter::add(const GreyView& frame, double full, const PatternField& fiel
   const Sums sums = std::visit([&](const auto& pixels) { return sum_up(pixels, full, field, options, task); }, frame);
   const Eigen::LDLT<Eigen::Matrix<float, kFitted, kFitted>> others(sums.normal);
   if (others.info() != Eigen::Success || !others.isPositive()) return;
-  const Row explained = others.solve(sums.with_blur);
-  const float known = sums.blur_blur - sums.with_blur.dot(explained),
-              asked = sums.blur_right - sums.right.dot(explained);
-  if (known > 1e-3F * sums.blur_blur && std::isfinite(asked)) patches_.emplace_back(asked / known, known);
+  const Eigen::Matrix<float, kFitted, kChanges> explained = others.solve(sums.with_changes);
+  const Eigen::Matrix<float, kChanges, kChanges> known = sums.changes - sums.with_changes.transpose() * explained;
+  const Changes asked = sums.changes_right - explained.transpose() * sums.right;
+  const float blur = known(kOfBlur, kOfBlur), both = known(kOfBlur, kOfTone);
+  if (!(blur > kKnownMin * sums.changes(kOfBlur, kOfBlur)) || !asked.allFinite()) return;
+  patches_.emplace_back(asked[kOfBlur] / blur, blur);
+  // A wrong blur must not pass for a tone curve: it is eliminated, too.
+  const float tone = known(kOfTone, kOfTone) - both * both / blur;
+  if (tone > kKnownMin * sums.changes(kOfTone, kOfTone))
+    tones_.emplace_back((asked[kOfTone] - both / blur * asked[kOfBlur]) / tone, tone);
 }
 
-std::optional<float> BlurMeter::change() {
-  if (patches_.empty()) return std::nullopt;
-  std::ranges::sort(patches_);
+std::optional<float> BlurMeter::weighted_median(Weighted& values) {
+  if (values.empty()) return std::nullopt;
+  std::ranges::sort(values);
   float all = 0, below = 0;
-  for (const auto& [change, weight] : patches_) all += weight;
-  for (const auto& [change, weight] : patches_)
-    if (below += weight; 2 * below >= all) return change;
-  return patches_.back().first;
+  for (const auto& [value, weight] : values) all += weight;
+  for (const auto& [value, weight] : values)
+    if (below += weight; 2 * below >= all) return value;
+  return values.back().first;
 }
 
 float changed_blur_px(float blur_px, float change) {

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -9,26 +10,33 @@
 #include <vector>
 
 #include "core/appearance/align_patches.hpp"
+#include "core/appearance/tone_curve.hpp"
 
 namespace slsd {
 
 /// Measures from aligned patches how much wider or narrower the frame's blur is than the field's. A change s of the
 /// blur's variance changes the pattern by s/2 times its Laplacian (the heat equation). This is one more unknown of the
-/// aligner's equations, the same for all patches, while each has its own place and light.
+/// aligner's equations, the same for all patches, while each has its own place and light. Measures also the camera's
+/// tone curve, which is another unknown: levels that are the light to a power, see ToneCurve.
 /// @thread thread-bound: keeps its buffers
 class BlurMeter {
  public:
-  void clear() { patches_.clear(); }
+  void clear() { patches_.clear(), tones_.clear(); }
   /// Adds a patch that was aligned with the field.
   /// @param full  the level of a saturated pixel, see Censored
   void add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
            const CellTask& task);
   /// Change of the variance, projector px^2: the median of the patches, weighted by what each knows. Empty without a
   /// patch that knows anything.
-  [[nodiscard]] std::optional<float> change();
+  [[nodiscard]] std::optional<float> change() { return weighted_median(patches_); }
+  /// Change of the power, likewise: 0 for levels that are proportional to the light.
+  [[nodiscard]] std::optional<float> tone_change() { return weighted_median(tones_); }
 
  private:
-  std::vector<std::pair<float, float>> patches_;  // change, and its weight
+  using Weighted = std::vector<std::pair<float, float>>;  // values, and their weights
+  [[nodiscard]] static std::optional<float> weighted_median(Weighted& values);
+
+  Weighted patches_, tones_;
 };
 
 /// Standard deviation after a change of the variance: between 2/3 and 3/2 of the old one, for the equations are linear
@@ -39,6 +47,7 @@ class BlurMeter {
 struct BlurSeen {
   std::size_t aligned = 0, tried = 0;  ///< number of patches
   float blur_px = 0;                   ///< standard deviation, projector px; the field's own if no patch knows it
+  float tone_change = 0;               ///< see BlurMeter; 0 if no patch knows it
 };
 
 /// Finds the field of a frame's blur: from a usual blur, until the blur rests. If most patches fail at the usual blur,
@@ -57,6 +66,34 @@ template <class Look>
     auto next = fields.at(look(*field).blur_px);
     if (next == field) break;
     field = std::move(next);
+  }
+  return field;
+}
+
+/// Finds the field and the camera's tone curve in turn, from a straight curve, until the curve rests.
+/// @param develop  void(): makes the light of the frame, which look() looks at, by the present curve
+/// @param look     as for find_field()
+template <class Develop, class Look>
+[[nodiscard]] std::shared_ptr<const PatternField> find_field_and_tone(const PatternFields& fields, ToneCurve& tone,
+                                                                      Develop&& develop, Look&& look) {
+  constexpr int kRoundsMost = 4;
+  constexpr float kAtRest = 0.02F;
+  std::shared_ptr<const PatternField> field;
+  tone.set_power(1);
+  for (int round = 0; round < kRoundsMost; ++round) {
+    develop();
+    float change = 0;
+    field = find_field(fields, [&](const PatternField& tried) {
+      const BlurSeen seen = look(tried);
+      change = seen.tone_change;
+      return seen;
+    });
+    const float power = tone.power();
+    tone.set_power(power * (1 + change));
+    if (std::abs(tone.power() - power) < kAtRest || round + 1 == kRoundsMost) {
+      tone.set_power(power);
+      break;
+    }
   }
   return field;
 }

@@ -9,6 +9,7 @@
 #include <Eigen/LU>
 
 #include "core/decode/grid/lattice_frame.hpp"
+#include "core/exposure/frame_noise.hpp"
 
 namespace slsd {
 namespace {
@@ -136,13 +137,25 @@ void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
   }
 }
 
-/// Finds the frame's offset from its epipolar lines, and its blur. An offset looks like blur, and a wrong blur hides
-/// part of the offset. So it estimates them in turn.
-void DenseMapper::find_pattern(const DenseFrame& frame) {
-  field_ = find_field(fixed_->fields, [&](const PatternField& field) {
-    grid_.find_epipolar_offset(frame, field, seeds_);
-    return grid_.look_at_blur(frame, field, seeds_);
-  });
+/// The light of a frame's pixels, by the present tone curve.
+DenseFrame DenseMapper::develop(const DenseFrame& frame) {
+  if (tone_.is_straight()) return frame;
+  const GreyView light = tone_.light_of(frame.pixels, frame.full).view();
+  return {light, ToneCurve::kFull, measure_noise(light, ToneCurve::kFull), tone_.power()};
+}
+
+/// Finds the frame's offset from its epipolar lines, its blur, and the camera's tone curve. Each looks like a part of
+/// the others, so it estimates them in turn.
+/// @return the light of the frame
+DenseFrame DenseMapper::find_pattern(const DenseFrame& frame) {
+  DenseFrame light = frame;
+  field_ = find_field_and_tone(
+      fixed_->fields, tone_, [&] { light = develop(frame); },
+      [&](const PatternField& field) {
+        grid_.find_epipolar_offset(light, field, seeds_);
+        return grid_.look_at_blur(light, field, seeds_);
+      });
+  return light;
 }
 
 DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
@@ -150,9 +163,11 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   const auto done = [&](DenseStage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
-  const DenseFrame seen{frame, full, symbols.noise};
+  const DenseFrame taken{frame, full, symbols.noise};
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
   find_seeds(symbols);
+  tone_.set_power(next ? follower_.tone_power() : 1);
+  DenseFrame seen = develop(taken);
   const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
   followed_ = from ? follower_.followed() : 0, across_px_ = from ? follower_.across_px() : 0;
   if (from) {
@@ -160,7 +175,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
     grid_.set_epipolar_offset(from->epipolar);
   } else {
     grid_.clear();
-    find_pattern(seen);
+    seen = find_pattern(taken);
   }
   const PatternField& field = *field_;
   done(DenseStage::kFindBlur);
@@ -184,6 +199,9 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   cleaner_.drop_small_components(map_, patch, seeds_);
   cleaner_.prune(map_, fixed_->decode.dense.prune_px, patch);
   cleaner_.drop_beyond_the_light(map_);
+  if (!tone_.is_straight())
+    std::ranges::transform(map_.intensity, map_.intensity.begin(),
+                           [&](std::uint8_t light) { return tone_.level_of(light); });
   map_.count_pixels();
   if (next) follower_.finish(map_, grid_);
   done(DenseStage::kClean);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/appearance/pattern_field.hpp"
+#include "core/appearance/tone_curve.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/dense/clean_map.hpp"
@@ -80,6 +81,8 @@ class DenseMapper {
   [[nodiscard]] std::size_t followed_nodes() const { return followed_; }
   /// Blur of the pattern in the last frame, projector px; 0 before the first.
   [[nodiscard]] float blur_sigma_px() const { return field_ ? field_->blur_sigma_px() : 0; }
+  /// Power of the light that the last frame's levels are, see ToneCurve.
+  [[nodiscard]] float tone_power() const { return tone_.power(); }
   /// Offset of the pattern from its epipolar lines at the centre of the last frame, projector px.
   [[nodiscard]] float epipolar_offset_px() const { return grid_.epipolar_offset().middle + across_px_; }
 
@@ -87,7 +90,8 @@ class DenseMapper {
   struct Fixed;
   explicit DenseMapper(std::shared_ptr<const Fixed> fixed);
   void find_seeds(const DecodedSymbols& symbols);
-  void find_pattern(const DenseFrame& frame);
+  [[nodiscard]] DenseFrame develop(const DenseFrame& frame);
+  [[nodiscard]] DenseFrame find_pattern(const DenseFrame& frame);
   DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                     DenseObserver* observer, bool next);
 
@@ -100,6 +104,7 @@ class DenseMapper {
   PixelJudge judge_;
   MapCleaner cleaner_;
   std::vector<SurfaceSeed> seeds_;
+  ToneCurve tone_;
   std::shared_ptr<const PatternField> field_;  // the pattern as the last frame shows it
   DenseMap map_;
 };

@@ -216,6 +216,11 @@ void GridFollower::stop_what_moves(SurfaceGrid& grid) {
   across_px_ = across / static_cast<float>(std::max<std::size_t>(1, followed_));
 }
 
+float GridFollower::tone_power() const {
+  const std::lock_guard lock(shared_->mutex);
+  return shared_->frame ? shared_->frame->tone_power : 1;
+}
+
 std::shared_ptr<const FollowedFrame> GridFollower::follow(const DenseFrame& frame, SurfaceGrid& grid,
                                                           Executor& executor) {
   grid.clear();
@@ -227,7 +232,8 @@ std::shared_ptr<const FollowedFrame> GridFollower::follow(const DenseFrame& fram
   }
   const auto [width, height] = size_of(frame.pixels);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  if (!from || from->pixels.size() != pixels || from->nodes.size() != grid.nodes().size() || from->full != frame.full)
+  if (!from || from->pixels.size() != pixels || from->nodes.size() != grid.nodes().size() || from->full != frame.full ||
+      from->tone_power != frame.tone_power)
     return nullptr;
   columns_.resize(std::max(columns_.size(), static_cast<std::size_t>(executor.workers())));
   moves_.assign(from->nodes.size(), {});
@@ -278,7 +284,8 @@ void GridFollower::keep(const DenseFrame& frame, const std::shared_ptr<const Pat
   if (share < 1 - kStillMore && still_share(frame, grid) > share + kStillMore) {
     kept_ = std::make_shared<FollowedFrame>();
     copy_levels(frame.pixels, kept_->pixels);
-    kept_->full = frame.full, kept_->pattern_field = field, kept_->epipolar = grid.epipolar_offset();
+    kept_->full = frame.full, kept_->tone_power = frame.tone_power, kept_->pattern_field = field,
+    kept_->epipolar = grid.epipolar_offset();
     kept_->nodes.assign(grid.nodes().begin(), grid.nodes().end());
     for (const SurfaceSeed& seed : found)
       if (grid.good_at(seed.camera_px)) kept_->found.push_back(seed);

@@ -36,6 +36,8 @@ class GridFollower {
   /// Makes a follower for another thread that measures frames of the same camera.
   [[nodiscard]] GridFollower another() const { return {window_px_, shared_}; }
 
+  /// The tone of the frame that the next one may continue, see DenseFrame.
+  [[nodiscard]] float tone_power() const;
   /// Begins a frame: gives the grid the nodes that continue, and closes nodes that failed before on the same pixels.
   /// @return the frame that they continue; null if most do not, and the grid starts afresh
   [[nodiscard]] std::shared_ptr<const FollowedFrame> follow(const DenseFrame& frame, SurfaceGrid& grid,

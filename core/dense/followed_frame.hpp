@@ -18,6 +18,7 @@ namespace slsd {
 struct FollowedFrame {
   std::vector<std::uint16_t> pixels;
   double full = 0;
+  float tone_power = 1;                               ///< see DenseFrame
   std::shared_ptr<const PatternField> pattern_field;  ///< the field that the nodes were aligned with
   EpipolarOffset epipolar;
   std::vector<SurfaceNode> nodes;                  ///< good if they gave points

@@ -168,6 +168,7 @@ BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const PatternField& 
                     {.patch = task, .window_px = options_.window_px, .square_half_px = kEverywherePx});
   }
   seen.blur_px = changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
+  seen.tone_change = blur_meter_.tone_change().value_or(0);
   return seen;
 }
 

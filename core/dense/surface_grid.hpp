@@ -62,6 +62,7 @@ struct DenseFrame {
   GreyView pixels;
   double full;  ///< the level of a saturated pixel
   FrameNoise noise;
+  float tone_power = 1;  ///< the power of the camera's levels, of which these pixels are the light: see ToneCurve
 };
 
 /// Geometry of a camera and its projector, for patches anywhere in the frame.

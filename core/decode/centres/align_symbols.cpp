@@ -75,13 +75,11 @@ SymbolAligner::SymbolAligner(const Pattern& pattern, const CalibratedCamera& cam
       half_px_(0.5F * pitch_px_ + kBeyondCellPx),
       fields_(std::make_shared<const PatternFields>(draw_pattern(pattern))) {}
 
-CellTask SymbolAligner::cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm,
-                                const FrameNoise& noise) const {
+CellTask SymbolAligner::cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm) const {
   CellTask cell;
   PatchTask& patch = cell.patch;
   patch.x = static_cast<int>(std::lround(symbol.centre_px.x()));
   patch.y = static_cast<int>(std::lround(symbol.centre_px.y()));
-  patch.noise = noise.at(symbol.background + 0.5F * symbol.gain);  // midway between dark and lit
   const Eigen::Vector2d middle_px(patch.x, patch.y);
   patch.map = make_patch_map(ray_beside(ray, middle_px - symbol.centre_px.cast<double>()), middle_px,
                              camera_.projector_from_camera, projector_, depth_mm);
@@ -118,6 +116,23 @@ CellTask SymbolAligner::cell_of(const LatticeSymbol& symbol, const PixelRay& ray
   return cell;
 }
 
+/// The light of a frame's pixels, by the present tone curve. Sets the cells' noise in it.
+SymbolAligner::Developed SymbolAligner::develop(const Developed& frame, const FrameNoise& noise,
+                                                const Lattice& lattice) {
+  Developed light = frame;
+  FrameNoise noise_there = noise;
+  if (!tone_.is_straight()) {
+    light = {tone_.light_of(frame.pixels, frame.full).view(), ToneCurve::kFull};
+    noise_there = measure_noise(light.pixels, light.full);
+  }
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    const LatticeSymbol& symbol = lattice.symbols[i];
+    const float between = symbol.background + 0.5F * symbol.gain;  // midway between dark and lit
+    cells_[i].patch.noise = noise_there.at(tone_.is_straight() ? between : tone_.light_of(between, frame.full));
+  }
+  return light;
+}
+
 /// Aligns a sample of the symbols with a field, and measures their blur.
 BlurSeen SymbolAligner::look_at_blur(const GreyView& frame, double full, const PatternField& field) {
   const std::size_t step = std::max<std::size_t>(1, cells_.size() / kBlurSamples);
@@ -131,6 +146,7 @@ BlurSeen SymbolAligner::look_at_blur(const GreyView& frame, double full, const P
     blur_meter_.add(frame, full, field, {}, cell);
   }
   seen.blur_px = changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
+  seen.tone_change = blur_meter_.tone_change().value_or(0);
   return seen;
 }
 
@@ -215,11 +231,17 @@ const std::vector<AlignedSymbol>& SymbolAligner::align(const GreyView& frame, do
   cells_.clear();
   aligned_.clear();
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i)
-    cells_.push_back(cell_of(lattice.symbols[i], rays[i], depths_mm[i], noise));
+    cells_.push_back(cell_of(lattice.symbols[i], rays[i], depths_mm[i]));
   if (cells_.empty()) return aligned_;
-  const auto field = find_field(*fields_, [&](const PatternField& tried) { return look_at_blur(frame, full, tried); });
-  align_cells(frame, full, *field, {}, cells_);
-  try_neighbours(frame, full, lattice, *field);
+  Developed light{frame, full};
+  const auto field = find_field_and_tone(
+      *fields_, tone_,
+      [&] {
+        light = develop({frame, full}, noise, lattice);
+      },
+      [&](const PatternField& tried) { return look_at_blur(light.pixels, light.full, tried); });
+  align_cells(light.pixels, light.full, *field, {}, cells_);
+  try_neighbours(light.pixels, light.full, lattice, *field);
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     const LatticeSymbol& symbol = lattice.symbols[i];
     aligned_.push_back(point_of(lattice, i, rays[i], cells.pixel(symbol.row, symbol.column).cast<float>()));

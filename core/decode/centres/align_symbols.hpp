@@ -9,6 +9,7 @@
 #include "core/appearance/align_patches.hpp"
 #include "core/appearance/measure_blur.hpp"
 #include "core/appearance/pattern_field.hpp"
+#include "core/appearance/tone_curve.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/grid/cell_rays.hpp"
 #include "core/decode/lattice.hpp"
@@ -52,8 +53,13 @@ class SymbolAligner {
                                                         std::span<const double> depths_mm, const CellRays& cells);
 
  private:
-  [[nodiscard]] CellTask cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm,
-                                 const FrameNoise& noise) const;
+  /// A frame's pixels, or the light of them, and the level of a saturated pixel.
+  struct Developed {
+    GreyView pixels;
+    double full;
+  };
+  [[nodiscard]] CellTask cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm) const;
+  [[nodiscard]] Developed develop(const Developed& frame, const FrameNoise& noise, const Lattice& lattice);
   [[nodiscard]] BlurSeen look_at_blur(const GreyView& frame, double full, const PatternField& field);
   void try_neighbours(const GreyView& frame, double full, const Lattice& lattice, const PatternField& field);
   [[nodiscard]] AlignedSymbol point_of(const Lattice& lattice, std::size_t index, const PixelRay& ray,
@@ -69,6 +75,7 @@ class SymbolAligner {
   std::vector<std::size_t> again_for_;  // for each of again_: index of its symbol
   std::vector<AlignedSymbol> aligned_;
   BlurMeter blur_meter_;
+  ToneCurve tone_;
 };
 
 }  // namespace slsd

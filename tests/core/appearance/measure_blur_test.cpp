@@ -31,7 +31,8 @@ struct Patches {
   Grey16 frame{1600, 1200};
   std::vector<CellTask> tasks;
 
-  explicit Patches(double blur_px, double noise = 0) {
+  /// @param tone_power  the levels are the light to this power
+  explicit Patches(double blur_px, double noise = 0, double tone_power = 1) {
     std::mt19937 random(7);
     std::normal_distribution<double> gauss(0, noise);
     const CalibratedCamera& camera = rig.cameras[0];
@@ -48,12 +49,37 @@ struct Patches {
           const Eigen::Vector3d ray = camera.lens.undistort({x, y}).homogeneous();
           const Eigen::Vector2d p = rig.projector.project(camera.projector_from_camera * (2000 * ray));
           const double light = test::plain_light(shown_pattern(), blur_px, p.x(), p.y());
-          frame.at(x, y) = static_cast<std::uint16_t>(std::lround(2000 + 40000 * light + gauss(random)));
+          const double level = 2000 + 40000 * light + gauss(random);
+          frame.at(x, y) = static_cast<std::uint16_t>(
+              std::lround(kBlurFull * std::pow(std::max(0.0, level) / kBlurFull, tone_power)));
         }
       }
     }
   }
 
+  /// The tone curve's power as the usual way finds it.
+  [[nodiscard]] float find_tone() const {
+    const PatternFields fields(shown_pattern());
+    ToneCurve tone;
+    GreyView light = frame.view();
+    double full = kBlurFull;
+    (void)find_field_and_tone(
+        fields, tone,
+        [&] {
+          if (!tone.is_straight()) light = tone.light_of(frame.view(), kBlurFull).view(), full = ToneCurve::kFull;
+        },
+        [&](const PatternField& field) {
+          std::vector<CellTask> aligned = tasks;
+          align_cells(light, full, field, {}, aligned);
+          BlurMeter meter;
+          for (const CellTask& task : aligned) meter.add(light, full, field, {}, task);
+          return BlurSeen{.aligned = 1,
+                          .tried = 1,
+                          .blur_px = changed_blur_px(field.blur_sigma_px(), meter.change().value_or(0)),
+                          .tone_change = meter.tone_change().value_or(0)};
+        });
+    return tone.power();
+  }
   /// The blur after some rounds that start at another.
   [[nodiscard]] float find_from(float blur_px, int rounds) const {
     BlurMeter meter;
@@ -86,9 +112,21 @@ TEST(BlurMeter, StandsNoise) {
   EXPECT_NEAR(Patches(0.8, 1500).find_from(0.72F, 3), 0.8F, 0.04F);
 }
 
+TEST(BlurMeter, FindsThePowerOfTheTone) {
+  for (const double power : {0.45, 0.6, 0.75}) {
+    for (const double blur_px : {0.6, 1.1})
+      EXPECT_NEAR(Patches(blur_px, 400, power).find_tone(), power, 0.03) << blur_px;
+  }
+}
+
+TEST(BlurMeter, StraightToneStaysStraight) {
+  for (const double blur_px : {0.45, 0.8, 1.5}) EXPECT_EQ(Patches(blur_px, 1500).find_tone(), 1) << blur_px;
+}
+
 TEST(BlurMeter, KnowsNothingOfWhatFailed) {
   BlurMeter meter;
   EXPECT_FALSE(meter.change().has_value());
+  EXPECT_FALSE(meter.tone_change().has_value());
   CellTask failed = Patches(0.8).tasks[0];
   failed.patch.failed = true;
   meter.add(Grey16(1600, 1200).view(), kBlurFull, PatternField(shown_pattern().view(), 0.8F), {}, failed);

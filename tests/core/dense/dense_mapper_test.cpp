@@ -291,6 +291,24 @@ TEST(DenseMapper, IntensityIsThatOfTheSurfaceInWhiteLight) {
   EXPECT_NEAR(levels[levels.size() / 20], SimulationOptions{}.lit, 15);
 }
 
+TEST(DenseMapper, MeasuresThroughACamerasToneCurve) {
+  Grey8 toned = tilted().frame;
+  for (int y = 0; y < toned.height(); ++y)
+    for (int x = 0; x < toned.width(); ++x)
+      toned.at(x, y) = static_cast<std::uint8_t>(std::lround(255 * std::pow(tilted().frame.at(x, y) / 255.0, 0.6)));
+  DenseMapper mapper = fresh_mapper();
+  const DenseMap map = measure(toned.view(), mapper).map;
+  EXPECT_NEAR(mapper.tone_power(), 0.6, 0.06);
+  const Score got = score(map, tilted()), straight = score(measure(tilted().frame.view()).map, tilted());
+  EXPECT_LT(got.median_px, 1.3 * straight.median_px + 0.003);
+  EXPECT_GT(got.measured, straight.measured * 97 / 100);
+  std::vector<std::uint8_t> levels;
+  for (std::size_t pixel = 0; pixel < map.pixels.size(); ++pixel)
+    if (map.measured(pixel)) levels.push_back(map.intensity[pixel]);
+  std::ranges::nth_element(levels, levels.begin() + static_cast<std::ptrdiff_t>(levels.size() / 2));
+  EXPECT_NEAR(levels[levels.size() / 2], 255 * std::pow(SimulationOptions{}.lit / 255, 0.6), 8);
+}
+
 TEST(DenseMapper, DepthBeyondTheWorkingRangeIsNone) {
   const Calibration rig = small_rig();
   DecodeOptions decode;
