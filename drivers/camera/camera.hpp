@@ -86,6 +86,14 @@ class Camera {
   /// its images accordingly.
   virtual void expect(Picture) {}
 
+  /// Sets the exposure of the next captures of an open camera. They wait for frames that were exposed with it.
+  /// @param exposure_us  a configured one; the camera opens with the first
+  /// @errors kUnsupported: the driver has no exposure; kMismatch: the device did not take it; kDisconnected: call
+  /// open()
+  [[nodiscard]] virtual Result<> set_exposure(double /*exposure_us*/) {
+    return fail(ErrorCode::kUnsupported, "this camera cannot change its exposure; remove exposures_us");
+  }
+
   /// Checks that the open device is still present, as far as possible without a frame and without waiting.
   /// @errors kDisconnected: call open()
   [[nodiscard]] virtual Result<> check() { return {}; }

@@ -31,6 +31,7 @@ class FaultyCamera final : public Camera {
   [[nodiscard]] std::chrono::nanoseconds open_time_max() const override { return camera_->open_time_max(); }
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   void expect(Picture light) override { camera_->expect(light); }
+  [[nodiscard]] Result<> set_exposure(double exposure_us) override { return camera_->set_exposure(exposure_us); }
   void tell_figures(std::vector<DriverFigure>& figures) const override { camera_->tell_figures(figures); }
   [[nodiscard]] Result<> check() override;
   void cancel() override;

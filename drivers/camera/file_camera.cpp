@@ -81,6 +81,7 @@ Result<> FileCamera::configure(const FrameFormat& format) {
   opened_ = std::chrono::steady_clock::now();
   next_sequence_ = 0;
   patterns_ = 0;
+  exposure_ = 0;
   return {};
 }
 
@@ -124,7 +125,16 @@ Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
   return frame ? Result<Frame>(std::move(*frame)) : fail_busy();
 }
 
+Result<> FileCamera::set_exposure(double exposure_us) {
+  const auto found = std::ranges::find(options_.exposures_us, exposure_us);
+  if (found == options_.exposures_us.end())
+    return fail(ErrorCode::kUnsupported, "no image has this exposure; correct exposures_us", options_.name);
+  exposure_ = static_cast<std::uint64_t>(found - options_.exposures_us.begin());
+  return {};
+}
+
 Result<const GreyImage*> FileCamera::next_image() {
+  while (patterns_ % exposures() != exposure_) ++patterns_;  // a scan may have ended before its last exposure
   if (patterns_ >= folder_.size() && !options_.loop)
     return fail(ErrorCode::kNotFound,
                 "all " + std::to_string(folder_.size()) + " images have been replayed; set loop = true to start over",
@@ -133,7 +143,7 @@ Result<const GreyImage*> FileCamera::next_image() {
   return folder_.image(patterns_++ % folder_.size());
 }
 
-// Chooses the image that belongs to the last pattern frame.
+// Chooses the image that belongs to the last pattern frame, and has the exposure.
 Result<const GreyImage*> FileCamera::image_in_light() {
   ImageFolder& folder = light_ == Picture::kWhite ? white_ : dark_;
   if (folder.size() == 0)
@@ -142,7 +152,8 @@ Result<const GreyImage*> FileCamera::image_in_light() {
                     "\" beside the images: add one, or scan without them",
                 options_.path.string());
   ++next_sequence_;
-  return folder.image((patterns_ == 0 ? 0 : patterns_ - 1) % folder.size());
+  const std::uint64_t set = (patterns_ == 0 ? 0 : patterns_ - 1) / exposures();
+  return folder.image((set * exposures() + exposure_) % folder.size());
 }
 
 tl::unexpected<Error> FileCamera::fail_late() const {

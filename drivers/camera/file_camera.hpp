@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -28,6 +30,7 @@ struct FileCameraOptions {
   double rate_hz = 0.0;             ///< 0: exposes at the trigger; else delivers frames in free run, up to 1000
   std::optional<std::pair<int, int>> size_px = {};  ///< expected width and height; empty: those of the first image
   BayerPattern bayer = BayerPattern::kNone;         ///< grey images are Bayer mosaics of this pattern
+  std::vector<double> exposures_us = {};            ///< the images have these exposures in turn; empty: all the same
   int frames_held_max = 8;                          ///< buffers, 2 to 64: how many frames may be held at once
   std::size_t cache_bytes = 64u << 20;  ///< limit of the decoded images kept in memory; others are decoded each time
 
@@ -43,6 +46,9 @@ struct FileCameraOptions {
 /// i-th pattern frame has the i-th image of each; if there are fewer, they start again. Without such a folder, the
 /// capture gives kNotFound.
 ///
+/// With exposures_us, the first image has the first exposure, the second image the second, and so on. The images of the
+/// folders "white" and "dark" then have the exposures in the same order.
+///
 /// Besides the errors of every camera, capture() gives: kNotFound if loop is off and all images were shown; kMismatch
 /// for an image of another size or depth than the first; errors of read_image(). That image's frame is lost, and the
 /// camera continues with the next. kDisconnected means that the folder or file is gone.
@@ -56,6 +62,8 @@ class FileCamera final : public Camera {
   [[nodiscard]] Result<> open() override;
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   void expect(Picture light) override { light_ = light; }
+  /// Chooses the next image with this exposure. @errors kUnsupported: not one of exposures_us
+  [[nodiscard]] Result<> set_exposure(double exposure_us) override;
   [[nodiscard]] Result<> check() override;
   void cancel() override { wake_.wake(); }
 
@@ -65,6 +73,7 @@ class FileCamera final : public Camera {
   [[nodiscard]] Result<> open_beside(const char* name, ImageFolder& folder);
   [[nodiscard]] Result<const GreyImage*> next_image();
   [[nodiscard]] Result<const GreyImage*> image_in_light();
+  [[nodiscard]] std::uint64_t exposures() const { return std::max<std::uint64_t>(options_.exposures_us.size(), 1); }
   [[nodiscard]] Result<> configure(const FrameFormat& format);
   [[nodiscard]] tl::unexpected<Error> fail_late() const;
   [[nodiscard]] tl::unexpected<Error> fail_busy() const;
@@ -78,6 +87,7 @@ class FileCamera final : public Camera {
   ImageFolder dark_;
   Picture light_ = Picture::kPattern;
   std::uint64_t patterns_ = 0;  ///< pattern frames so far
+  std::uint64_t exposure_ = 0;  ///< index in exposures_us
   std::optional<FramePool> pool_;
   MonotonicTime opened_;
   std::uint64_t next_sequence_ = 0;

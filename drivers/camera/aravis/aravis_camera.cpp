@@ -35,6 +35,7 @@ Result<> AravisCamera::open() {
   auto session = AravisSession::open(options_, address_, *events_, found_);
   if (!session) return tl::unexpected(session.error());
   session_ = std::move(*session);
+  exposure_changed_ = false;
   address_ = session_->address();
   description_.device = session_->name();
   description_.hardware = session_->name();
@@ -74,8 +75,30 @@ void AravisCamera::end_session() {
   closing_.emplace_back([dying = std::move(session_)]() mutable { dying.reset(); });
 }
 
+Result<> AravisCamera::set_exposure(double exposure_us) {
+  if (!session_) return fail(ErrorCode::kDisconnected, "the camera is not open; open it", options_.name);
+  if (options_.exposure_us == exposure_us) return {};
+  auto set = session_->set_exposure(exposure_us);
+  if (set) {
+    options_.exposure_us = exposure_us;
+    exposure_changed_ = options_.trigger == AravisTrigger::kFreeRun;
+  } else if (set.error().code == ErrorCode::kDisconnected) {
+    end_session();
+  }
+  return set;
+}
+
+Result<> AravisCamera::pass_over(MonotonicTime deadline) {
+  if (!exposure_changed_) return {};
+  const auto passed = note(session_->capture(deadline));
+  if (!passed && passed.error().code != ErrorCode::kMismatch) return tl::unexpected(passed.error());
+  exposure_changed_ = false;
+  return {};
+}
+
 Result<Frame> AravisCamera::capture(MonotonicTime deadline) {
   if (!session_) return fail(ErrorCode::kDisconnected, "the camera is not open; open it", options_.name);
+  if (auto passed = pass_over(deadline); !passed) return tl::unexpected(passed.error());
   return note(session_->capture(deadline));
 }
 

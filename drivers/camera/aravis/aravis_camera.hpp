@@ -51,6 +51,8 @@ class AravisCamera final : public Camera {
   /// @errors kMismatch: the frame was exposed with other settings than configured, and is lost; as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
+  /// Makes the next capture in free run pass over one frame more, because some cameras expose that one as before.
+  [[nodiscard]] Result<> set_exposure(double exposure_us) override;
   /// Reports what the device's clock, read every second, or the heartbeat has detected.
   [[nodiscard]] Result<> check() override;
   void tell_figures(std::vector<DriverFigure>& figures) const override;
@@ -68,6 +70,7 @@ class AravisCamera final : public Camera {
   void end_session();
   void log_warnings();
   [[nodiscard]] Result<Frame> note(Result<Frame> frame);
+  [[nodiscard]] Result<> pass_over(MonotonicTime deadline);
 
   AravisCameraOptions options_;
   CameraDescription description_;
@@ -76,6 +79,7 @@ class AravisCamera final : public Camera {
   std::unique_ptr<AravisSession> session_;
   AravisStatistics ended_;
   std::optional<MonotonicTime> last_start_;  ///< start of the previous frame's exposure
+  bool exposure_changed_ = false;            ///< the next frame in free run may have the exposure before
   std::string address_;
   std::vector<std::string> logged_;
   std::vector<std::jthread> closing_;

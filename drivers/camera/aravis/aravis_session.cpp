@@ -265,6 +265,14 @@ Result<> AravisSession::stop() {
   return DeviceFeatures(device_.camera.get()).execute("AcquisitionStop");
 }
 
+Result<> AravisSession::set_exposure(double exposure_us) {
+  if (auto there = check(); !there) return there;
+  const auto set = [&] { return configure_exposure(DeviceFeatures(device_.camera.get()), exposure_us); };
+  if (auto done = control_->use_camera(set); !done) return done;
+  options_.exposure_us = exposure_us;  // the stream's parts refer to these options
+  return {};
+}
+
 Result<Frame> AravisSession::capture(MonotonicTime deadline) {
   return frame_capture_->capture(deadline);
 }

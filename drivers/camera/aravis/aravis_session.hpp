@@ -58,6 +58,8 @@ class AravisSession {
   [[nodiscard]] bool answers();
   /// @errors kDisconnected: the camera was lost between captures
   [[nodiscard]] Result<> check();
+  /// Sets the exposure of the next triggers. @errors of configure_exposure()
+  [[nodiscard]] Result<> set_exposure(double exposure_us);
   /// Abandons the device: the session's end will not stop it.
   void abandon();
 

@@ -50,13 +50,6 @@ Result<> set_region(const DeviceFeatures& features, const AravisCameraOptions& o
   return set_extent(features, "Height", "OffsetY", whole ? "HeightMax" : "SensorHeight", height);
 }
 
-Result<> set_exposure(const DeviceFeatures& features, const AravisCameraOptions& options) {
-  if (auto done = features.choose_if_there("ExposureMode", "Timed"); !done) return done;
-  const char* name = features.has("ExposureTime") ? "ExposureTime" : "ExposureTimeAbs";
-  const double tolerance = std::max(kExposureToleranceUs, options.exposure_us * kExposureToleranceShare);
-  return features.set(name, options.exposure_us, std::min(tolerance, options.exposure_us / 2));
-}
-
 Result<> set_gain(const DeviceFeatures& features, const AravisCameraOptions& options) {
   if (features.has("GainSelector") && features.has_entry("GainSelector", "All"))
     if (auto done = features.choose("GainSelector", "All"); !done) return done;
@@ -133,7 +126,8 @@ Result<DeviceLayout> configure_image(const DeviceFeatures& features, const Aravi
   if (done) done = set_region(features, options);
   if (done) done = features.choose("PixelFormat", options.pixel_format);
   if (done) done = turn_automatics_off(features);
-  if (done) done = set_exposure(features, options);
+  if (done) done = features.choose_if_there("ExposureMode", "Timed");
+  if (done) done = configure_exposure(features, options.exposure_us);
   if (done) done = set_gain(features, options);
   if (!done) return tl::unexpected(done.error());
   const auto width = features.integer("Width");
@@ -141,6 +135,12 @@ Result<DeviceLayout> configure_image(const DeviceFeatures& features, const Aravi
   if (!width) return tl::unexpected(width.error());
   if (!height) return tl::unexpected(height.error());
   return DeviceLayout{*width, *height, *pixels, period_of(features, options)};
+}
+
+Result<> configure_exposure(const DeviceFeatures& features, double exposure_us) {
+  const char* name = features.has("ExposureTime") ? "ExposureTime" : "ExposureTimeAbs";
+  const double tolerance = std::max(kExposureToleranceUs, exposure_us * kExposureToleranceShare);
+  return features.set(name, exposure_us, std::min(tolerance, exposure_us / 2));
 }
 
 Result<> configure_clock(const DeviceFeatures& features, const AravisCameraOptions& options) {

@@ -30,6 +30,10 @@ struct DeviceLayout {
 /// @errors kUnsupported, kMismatch, kDisconnected
 [[nodiscard]] Result<DeviceLayout> configure_image(const DeviceFeatures& features, const AravisCameraOptions& options);
 
+/// Sets the exposure time, also while the camera acquires, and verifies it.
+/// @errors as configure_image()
+[[nodiscard]] Result<> configure_exposure(const DeviceFeatures& features, double exposure_us);
+
 /// Makes the camera's clock follow the network's if the options ask for it; otherwise lets it run on its own.
 /// @errors kUnsupported: the camera has no PTP; as configure_image()
 [[nodiscard]] Result<> configure_clock(const DeviceFeatures& features, const AravisCameraOptions& options);

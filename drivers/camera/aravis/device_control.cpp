@@ -221,6 +221,7 @@ void DeviceControl::run(const std::stop_token& stop) {
       asked_.wait_until(lock, stop, next_reading, [this] { return trigger_; });
       asked = std::exchange(trigger_, false);
     }
+    const std::lock_guard lock(using_camera_);
     if (asked) {
       send_trigger();
     } else if (steady_clock::now() >= next_reading) {

@@ -71,7 +71,7 @@ enum class PtpLock {
 /// @thread thread-safe
 class DeviceControl {
  public:
-  /// @param camera  must outlive this object; nobody else uses it meanwhile
+  /// @param camera  must outlive this object; others use it only through use_camera()
   /// @param clock   its readings so far; never read if the device has no readable clock
   /// @param ptp     its current state if the device's clock should follow the network's; else nothing
   DeviceControl(ArvCamera* camera, CaptureEvents& events, std::uint64_t session, const DeviceClock& clock,
@@ -82,6 +82,13 @@ class DeviceControl {
   DeviceControl& operator=(const DeviceControl&) = delete;
 
   void trigger();
+  /// Runs a job that uses the camera, once the command under way has ended. Runs it on the calling thread.
+  /// @return the job's outcome
+  template <class Job>
+  [[nodiscard]] auto use_camera(Job job) {
+    const std::lock_guard lock(using_camera_);
+    return job();
+  }
   [[nodiscard]] DeviceClock clock() const;
   /// Tells whether the device's clock follows the network's: the device reports it, or its clock was not set for a
   /// while.
@@ -96,6 +103,7 @@ class DeviceControl {
   ArvCamera* camera_;
   CaptureEvents& events_;
   std::uint64_t session_;
+  std::mutex using_camera_;
   mutable std::mutex mutex_;
   std::condition_variable_any asked_;
   bool trigger_ = false;

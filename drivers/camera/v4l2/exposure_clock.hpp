@@ -33,6 +33,9 @@ class ExposureClock {
   /// @param driver  as V4l2Device::driver()
   ExposureClock(const ExposureTiming& timing, const V4l2CameraOptions& options, const std::string& driver);
 
+  /// Notes another exposure for the next frames.
+  void set_exposure(const ExposureTiming& timing) { exposure_ = timing.exposure.value_or(period_); }
+
   /// Checks the stamp of each taken buffer, in order. One impossible stamp makes all stamps untrusted.
   /// @param received  when the buffer was taken from the driver
   void note(const v4l2_buffer& buffer, MonotonicTime received);

@@ -124,6 +124,22 @@ Result<Frame> V4l2Camera::run(const Capture& capture) {
   return frame;
 }
 
+Result<> V4l2Camera::set_exposure(double exposure_us) {
+  if (!stream_) return fail_here(ErrorCode::kDisconnected, "the camera is not open; open it");
+  if (options_.exposure_us == exposure_us) return {};
+  if (auto dropped = drop_waiting(); !dropped) return close(), dropped;
+  auto set = slsd::set_exposure(stream_->device(), exposure_us);
+  if (!set) {
+    if (set.error().code == ErrorCode::kDisconnected) close();
+    return set;
+  }
+  options_.exposure_us = exposure_us;
+  const int under_way = clock_.frames_in_flight();
+  clock_.set_exposure(read_timing(stream_->device()));
+  settling_ = std::max({options_.settle_frames, under_way, clock_.frames_in_flight()});
+  return {};
+}
+
 // An open file always answers; a call into the driver does not. Filled buffers prove nothing about now, and the frame
 // after the last may still be requested. So only after a pause are they emptied, to see whether more come.
 Result<> V4l2Camera::check() {

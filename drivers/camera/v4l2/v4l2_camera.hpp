@@ -50,6 +50,8 @@ class V4l2Camera final : public Camera {
   /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers. If the previous frame
   /// is older than a few periods, works as capture().
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
+  /// Makes the next capture pass over the frames under way, and at least settle_frames.
+  [[nodiscard]] Result<> set_exposure(double exposure_us) override;
   [[nodiscard]] Result<> check() override;
   void tell_figures(std::vector<DriverFigure>& figures) const override;
   void cancel() override { wake_.wake(); }

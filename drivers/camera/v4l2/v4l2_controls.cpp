@@ -185,6 +185,10 @@ std::string hertz_text(double hz) {
 
 }  // namespace
 
+Result<> set_exposure(const V4l2Device& device, double exposure_us) {
+  return set(device, {"exposure_us", V4L2_CID_EXPOSURE_ABSOLUTE}, exposure_us / kUnitUs);
+}
+
 Result<> set_controls(const V4l2Device& device, const V4l2CameraOptions& options) {
   if (!options.automatic) {
     if (auto off = turn_automatic_off(device); !off) return off;
@@ -192,8 +196,7 @@ Result<> set_controls(const V4l2Device& device, const V4l2CameraOptions& options
   Result<> done;
   if (options.power_line_hz)
     done = set(device, {"power_line_hz", V4L2_CID_POWER_LINE_FREQUENCY}, power_line_choice(*options.power_line_hz));
-  if (done && options.exposure_us)
-    done = set(device, {"exposure_us", V4L2_CID_EXPOSURE_ABSOLUTE}, *options.exposure_us / kUnitUs);
+  if (done && options.exposure_us) done = set_exposure(device, *options.exposure_us);
   if (done) done = set_gain(device, options);
   if (done && options.focus_steps) done = set(device, {"focus_steps", V4L2_CID_FOCUS_ABSOLUTE}, *options.focus_steps);
   return done;

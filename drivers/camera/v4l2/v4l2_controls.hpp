@@ -23,6 +23,9 @@ struct ExposureTiming {
 ///         value), kDisconnected, kIo; each names the control
 [[nodiscard]] Result<> set_controls(const V4l2Device& device, const V4l2CameraOptions& options);
 
+/// Sets the exposure, also while the device streams, and verifies the device's value. @errors as set_controls()
+[[nodiscard]] Result<> set_exposure(const V4l2Device& device, double exposure_us);
+
 /// Sets the frame rate if the options name one, and verifies it.
 /// @errors kUnsupported (the device has no such setting), kMismatch (it chose another), kDisconnected, kIo
 [[nodiscard]] Result<> set_frame_rate(const V4l2Device& device, const V4l2CameraOptions& options);

@@ -74,6 +74,35 @@ TEST_F(AravisCameraTest, RefusesASettingThatTheCameraDoesNotTake) {
   EXPECT_THAT(to_string(opened.error()), HasSubstr("ExposureTime: the camera set 123 instead of 10000"));
 }
 
+// Each frame's chunk has its exposure, and another than the one set would be an error.
+TEST_F(AravisCameraTest, ChangesTheExposureWhileItRuns) {
+  for (const AravisTrigger trigger : {AravisTrigger::kSoftware, AravisTrigger::kFreeRun}) {
+    AravisCameraOptions options = options_for(device_);
+    options.trigger = trigger;
+    options.exposure_us = 1000;
+    options.rate_hz = trigger == AravisTrigger::kFreeRun ? 100 : 0;
+    AravisCamera camera(options);
+    ASSERT_TRUE(opens(camera));
+    for (int i = 0; i < 6; ++i) {
+      const double exposure_us = i % 2 == 0 ? 4000 : 1000;
+      const auto set = camera.set_exposure(exposure_us);
+      ASSERT_TRUE(set) << to_string(set.error());
+      EXPECT_EQ(device_.read_double(test::kExposureTime), exposure_us);
+      const auto asked = std::chrono::steady_clock::now();
+      const auto frame = camera.capture(far_away());
+      ASSERT_TRUE(frame) << to_string(frame.error());
+      EXPECT_GE(frame->exposure_start(), asked);
+    }
+    EXPECT_EQ(camera.set_exposure(2e6).error().code, ErrorCode::kInvalidArgument);
+    EXPECT_TRUE(next(camera)) << "as before";
+  }
+  AravisCamera camera(options_for(device_));
+  EXPECT_EQ(camera.set_exposure(4000).error().code, ErrorCode::kDisconnected);
+  ASSERT_TRUE(opens(camera));
+  device_.hold(test::kExposureTime);
+  EXPECT_EQ(camera.set_exposure(4000).error().code, ErrorCode::kMismatch);
+}
+
 // Which the double, as many a camera, takes in silence.
 TEST_F(AravisCameraTest, RefusesWhatIsBeyondTheRangeThatTheCameraTells) {
   for (const bool exposure : {true, false}) {

@@ -44,6 +44,32 @@ TEST_F(FileCameraInLightTest, ReplaysWhatBelongsToTheFrameOfThePattern) {
   }
 }
 
+// Two exposures of each picture; a scan that ended after the first does not put them out of step.
+TEST_F(FileCameraInLightTest, ReplaysTheExposureThatIsSet) {
+  for (const int i : {0, 1, 2, 3}) put("0" + std::to_string(i) + ".pgm", i);
+  for (const int i : {4, 5, 6, 7}) put("white/0" + std::to_string(i) + ".pgm", i);
+  auto two = options();
+  two.exposures_us = {1000, 4000};
+  FileCamera camera(two);
+  ASSERT_TRUE(camera.open());
+  const auto next_with = [&](double exposure_us, Picture light) {
+    EXPECT_TRUE(camera.set_exposure(exposure_us));
+    return next_in(camera, light);
+  };
+  EXPECT_EQ(next_with(1000, Picture::kPattern), 0);
+  EXPECT_EQ(next_with(4000, Picture::kPattern), 1);
+  EXPECT_EQ(next_with(1000, Picture::kPattern), 2);
+  EXPECT_EQ(next_with(1000, Picture::kPattern), 0);
+  EXPECT_EQ(next_with(4000, Picture::kPattern), 1);
+  EXPECT_EQ(next_with(1000, Picture::kWhite), 4);
+  EXPECT_EQ(next_with(4000, Picture::kWhite), 5);
+  EXPECT_EQ(next_with(1000, Picture::kPattern), 2);
+  EXPECT_EQ(next_with(4000, Picture::kPattern), 3);
+  EXPECT_EQ(next_with(1000, Picture::kWhite), 6);
+  EXPECT_EQ(next_with(4000, Picture::kWhite), 7);
+  EXPECT_EQ(camera.set_exposure(2000).error().code, ErrorCode::kUnsupported);
+}
+
 TEST_F(FileCameraInLightTest, CountsEveryFrame) {
   put("0.pgm", 0);
   put("white/0.pgm", 1);

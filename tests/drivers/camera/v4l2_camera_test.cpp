@@ -49,6 +49,32 @@ TEST_F(V4l2CameraTest, NeverGivesAFrameThatWasInFlightBeforeTheTrigger) {
   }
 }
 
+// Frames that were in flight at the change have the exposure before, whatever their stamps say.
+TEST_F(V4l2CameraTest, PassesOverFramesThatAnotherExposureMayHaveBegun) {
+  for (const std::uint32_t source : {V4L2_BUF_FLAG_TSTAMP_SRC_SOE, V4L2_BUF_FLAG_TSTAMP_SRC_EOF}) {
+    DoubleOptions options = test::quick_double();
+    options.stamp_flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | source;
+    options.controls = test::uvc_controls();
+    if (!make(options, {.exposure_us = 500, .settle_frames = 0})) return;
+    const auto opened = camera_->open();
+    ASSERT_TRUE(opened) << to_string(opened.error());
+    for (int i = 0; i < 10; ++i) {
+      const double exposure_us = i % 2 == 0 ? 2000 : 500;
+      ASSERT_TRUE(camera_->set_exposure(exposure_us));
+      EXPECT_EQ(double_->control(V4L2_CID_EXPOSURE_ABSOLUTE), exposure_us / 100);
+      const std::uint64_t next = double_->next_number();
+      ASSERT_TRUE(camera_->set_exposure(exposure_us)) << "changes nothing";
+      const auto frame = capture();
+      ASSERT_TRUE(frame) << to_string(frame.error());
+      EXPECT_GE(*test::number_of(frame->image()), next);
+    }
+    EXPECT_EQ(camera_->set_exposure(1e9).error().code, ErrorCode::kInvalidArgument);
+    EXPECT_TRUE(capture());
+    camera_.reset();
+    EXPECT_EQ(V4l2Camera({.device = "x"}).set_exposure(500).error().code, ErrorCode::kDisconnected);
+  }
+}
+
 // The time of day in the place of CLOCK_MONOTONIC, and someone sets it.
 TEST_F(V4l2CameraTest, NeverGivesAnOldFrameWhereTheDriverStampsTheTimeOfDay) {
   static constexpr auto kFiftyYears = std::chrono::hours(24 * 365 * 50);
@@ -157,7 +183,6 @@ class V4l2DoubleTest : public test::V4l2Test {
  protected:
   bool open_blocking() {
     DoubleOptions options = test::triggered_double();
-    options.controls = test::uvc_controls();
     if (!make(options)) return false;
     file_ = open(double_->path().c_str(), O_RDWR | O_CLOEXEC);
     return file_ >= 0;
