@@ -138,7 +138,7 @@ std::string_view remedy(Trouble trouble) {
       return "the symbols hardly stand out from the noise: use less gain and more light, and let nothing move";
     case Trouble::kUneven:
       return "the brightest symbols are more than 20 times as bright as the faintest: turn the object, move the "
-             "projector away, or coat shiny and black parts";
+             "projector away, coat shiny and black parts, or set exposures_us if nothing moves";
     case Trouble::kMoves:
       return "the scene moves between two frames: hold it still and measure again, or keep the exposure this short";
     case Trouble::kFlickers:

@@ -103,6 +103,15 @@ void read_faults(TableReader& reader, CameraOptions& options) {
   }
 }
 
+void read_exposures(TableReader& reader, CameraOptions& options) {
+  std::vector<double> exposures_us;
+  reader.read("exposures_us", exposures_us);
+  if (!reader.has("exposures_us")) return;
+  if (exposures_us.empty()) reader.refuse("exposures_us", "must be two exposures, as in [2000, 8000]");
+  if (reader.has("exposure_us")) reader.refuse("exposures_us", "and exposure_us both set the exposure: leave one out");
+  options.set_exposures(std::move(exposures_us));
+}
+
 void refuse_keys_of_others(TableReader& reader, const toml::table& table, std::string_view driver) {
   const std::vector<std::string> own = reader.known();
   for (auto& [name, ignored] : drivers()) {
@@ -123,6 +132,7 @@ void read_keys(TableReader& reader, CameraOptions& options) {
   reader.choose("driver", options.of_driver, of_drivers);
   std::visit([&](auto& of_driver) { of_driver.name = name; }, options.of_driver);
   read_driver_keys(reader, options.of_driver);
+  read_exposures(reader, options);
   read_faults(reader, options);
 }
 
@@ -157,7 +167,7 @@ std::vector<std::string> known_camera_keys() {
   std::vector<std::string> keys;
   for (const auto& [driver, of_driver] : drivers()) {
     TableReader reader(nullptr, "", "");
-    CameraOptions ignored{of_driver, {}};
+    CameraOptions ignored{of_driver, {}, {}};
     read_keys(reader, ignored);
     for (const std::string& key : reader.known()) keys.push_back("camera." + std::string(driver) + "." + key);
   }

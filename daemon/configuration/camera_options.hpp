@@ -28,11 +28,15 @@ Overloaded(Visits...) -> Overloaded<Visits...>;
 struct CameraOptions {
   std::variant<FileCameraOptions, V4l2CameraOptions, AravisCameraOptions> of_driver;
   std::vector<Fault> faults;  ///< simulated faults, for tests of the code above the camera
+  /// Two exposures of each picture, to be merged; the driver opens with the first. Empty: one exposure.
+  std::vector<double> exposures_us = {};
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::string_view driver() const;  ///< "file", "v4l2" or "aravis"
   /// The configured exposure. Empty if the driver keeps the camera's own value or has none.
   [[nodiscard]] std::optional<double> exposure_us() const;
+  /// Sets two exposures, and the shorter one as the driver's own.
+  void set_exposures(std::vector<double> exposures_us);
   [[nodiscard]] std::optional<double> gain_db() const;
   /// The pixel format, in the driver's words. Empty if the driver chooses.
   [[nodiscard]] std::string format() const;

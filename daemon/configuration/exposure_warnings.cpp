@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/configuration/exposure_warnings.hpp"
 
-#include <optional>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -37,13 +37,17 @@ std::vector<std::string> exposure_warnings(const Configuration& configuration) {
                              .power_line_hz = static_cast<double>(configuration.scan.power_line_hz)};
   std::vector<std::string> warnings;
   for (const CameraOptions& camera : configuration.cameras) {
-    const std::optional<double> exposure_us = camera.exposure_us();
-    if (!exposure_us || *exposure_us <= 0) continue;
-    const ExposureFit fit = fit_exposure(*exposure_us, periods);
-    if (fit.fits()) continue;
-    warnings.push_back(fmt::format(
-        "camera \"{}\": exposure_us = {:g} is not a whole multiple of {}, so frames differ in brightness: {}",
-        camera.name(), *exposure_us, misfits(fit, periods), nearest(fit)));
+    const bool several = !camera.exposures_us.empty() && !camera.replays();
+    const std::vector<double> exposures_us =
+        several ? camera.exposures_us : std::vector{camera.exposure_us().value_or(0)};
+    for (const double exposure_us : exposures_us) {
+      if (exposure_us <= 0) continue;
+      const ExposureFit fit = fit_exposure(exposure_us, periods);
+      if (fit.fits()) continue;
+      warnings.push_back(fmt::format(
+          "camera \"{}\": {} {:g} is not a whole multiple of {}, so frames differ in brightness: {}", camera.name(),
+          several ? "of exposures_us," : "exposure_us =", exposure_us, misfits(fit, periods), nearest(fit)));
+    }
   }
   return warnings;
 }

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "core/printable.hpp"
 #include "daemon/configuration/access.hpp"
@@ -16,10 +18,33 @@
 namespace slsd {
 namespace {
 
+constexpr double kExposureRatioMin = 1.5, kExposureRatioMax = 100;
+constexpr int kFramesOfAScan = 6;  // two exposures of the pattern, of white and of black
+
 Result<> in_range(const char* key, std::int64_t value, std::int64_t low, std::int64_t high) {
   if (value >= low && value <= high) return {};
   return fail(ErrorCode::kInvalidArgument, std::string(key) + " must be " + std::to_string(low) + " to " +
                                                std::to_string(high) + ", not " + std::to_string(value));
+}
+
+tl::unexpected<Error> refuse_exposures(std::string_view why) {
+  return fail(ErrorCode::kInvalidArgument, "exposures_us " + std::string(why));
+}
+
+Result<> check_exposures(const CameraOptions& camera) {
+  const std::vector<double>& exposures_us = camera.exposures_us;
+  if (exposures_us.empty()) return {};
+  if (exposures_us.size() != 2) return refuse_exposures("must be two exposures, as in [2000, 8000]");
+  const double shorter = exposures_us[0], longer = exposures_us[1];
+  if (!(shorter >= 1 && longer <= 1e6)) return refuse_exposures("must be 1 to 1000000");
+  if (!(longer >= kExposureRatioMin * shorter && longer <= kExposureRatioMax * shorter))
+    return refuse_exposures("must be the shorter first, then one that is 1.5 to 100 times as long");
+  const auto* const v4l2 = std::get_if<V4l2CameraOptions>(&camera.of_driver);
+  if (v4l2 != nullptr && v4l2->automatic) return refuse_exposures("cannot be set while automatic is true");
+  const int held_max = std::visit([](const auto& options) { return options.frames_held_max; }, camera.of_driver);
+  if (held_max < kFramesOfAScan)
+    return refuse_exposures("needs frames_held_max of " + std::to_string(kFramesOfAScan) + " or more");
+  return {};
 }
 
 }  // namespace
@@ -36,6 +61,14 @@ std::optional<double> CameraOptions::exposure_us() const {
   return std::visit(Overloaded{[](const FileCameraOptions&) { return std::optional<double>(); },
                                [](const auto& options) { return std::optional<double>(options.exposure_us); }},
                     of_driver);
+}
+
+void CameraOptions::set_exposures(std::vector<double> given_us) {
+  if (given_us.empty()) return;
+  exposures_us = std::move(given_us);
+  std::visit(Overloaded{[&](FileCameraOptions& options) { options.exposures_us = exposures_us; },
+                        [&](auto& options) { options.exposure_us = exposures_us.front(); }},
+             of_driver);
 }
 
 std::optional<double> CameraOptions::gain_db() const {
@@ -59,6 +92,7 @@ Result<> CameraOptions::validate() const {
   if (file != nullptr && file->path.empty()) {
     return fail(ErrorCode::kInvalidArgument, "path must name an image or a folder of images for the driver \"file\"");
   }
+  if (auto valid = check_exposures(*this); !valid) return valid;
   return std::visit([](const auto& options) { return options.validate(); }, of_driver);
 }
 

@@ -223,7 +223,7 @@ std::vector<CameraOptions> with_exposures_of(std::vector<CameraOptions> cameras,
                                              const std::vector<CameraOptions>& others) {
   for (CameraOptions& camera : cameras) {
     const auto other = std::ranges::find(others, camera.name(), [](const auto& each) { return each.name(); });
-    if (other == others.end()) continue;
+    if (other == others.end() || other->exposures_us != camera.exposures_us) continue;
     if (auto* v4l2 = std::get_if<V4l2CameraOptions>(&camera.of_driver)) {
       if (const auto* from = std::get_if<V4l2CameraOptions>(&other->of_driver))
         v4l2->exposure_us = from->exposure_us, v4l2->gain_db = from->gain_db, v4l2->gain_steps = from->gain_steps;

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "daemon/scan/cloud/frame_image.hpp"
+#include "daemon/scan/cloud/merge_frames.hpp"
 #include "daemon/scan/cloud/reconstruct.hpp"
 
 namespace slsd {
@@ -72,7 +73,11 @@ void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Wa
 
 void Scan::compute(std::size_t lane) {
   const bool in_time = !over();
-  if (set_ && in_time) result_ = reconstruct(*set_, *setup_, lane, request_, id_);
+  if (set_ && in_time) {
+    auto merged = merge_frames(*set_, *setup_);
+    result_ = reconstruct(*set_, *setup_, lane, request_, id_);
+    if (result_) result_->merged = std::move(merged);
+  }
   if (!set_) result_ = tl::unexpected(set_.error());
   if (set_ && keep_) keep_(*this, *set_);
   if (set_) set_->give_back();  // back to the driver before other jobs have their turn

@@ -75,10 +75,12 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   auto projector = make_projector(configuration.projector);
   if (!projector) return tl::unexpected(projector.error());
   std::vector<std::unique_ptr<Camera>> cameras;
+  std::vector<std::vector<double>> exposures_us;
   for (const CameraOptions& options : configuration.cameras) {
     auto camera = make_camera(options);
     if (!camera) return tl::unexpected(camera.error());
     cameras.push_back(std::move(*camera));
+    exposures_us.push_back(options.exposures_us);
   }
   Notifier().starting("starting: preparing the decoder", kPrepareTime);
   auto setup = ScanSetup::create(configuration, DecodeLanes::lanes_here());
@@ -88,7 +90,8 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   for (const std::string& doubt : setup->doubts) spdlog::warn("{}", doubt);
   if (configuration.decode.density == Density::kPixels && setup->calibration)
     for (const std::string& warning : calibration_error_warnings(*setup->calibration)) spdlog::warn("{}", warning);
-  auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan);
+  auto rig =
+      std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan, exposures_us);
   rig->set_idle(draw_idle(configuration.projector), std::chrono::milliseconds(configuration.projector.idle_after_ms));
   std::error_code ignored;
   const auto known_from_anywhere = std::filesystem::absolute(file, ignored);

@@ -12,6 +12,8 @@
 #include "clients/connection/connection.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/dense/dense_outlook.hpp"
+#include "core/exposure/light_levels.hpp"
+#include "core/exposure/merge_exposures.hpp"
 #include "core/image_size.hpp"
 #include "core/printable.hpp"
 #include "daemon/configuration/access.hpp"
@@ -289,12 +291,22 @@ class Check {
     if (options.replays()) check_symbols(name, options, **camera);
   }
 
+  void check_light(const std::string& name, const CameraOptions& options, const GreyView& frame) {
+    const LightLevels levels = measure_light(frame, guess_full_level(frame));
+    if (!options.exposures_us.empty() || !needs_second_exposure(levels)) return;
+    findings_.warn(
+        fmt::format("{}: symbols are clipped in {:.0f} % of the pattern, while the faintest reach {:.0f} of "
+                    "{:.0f}: if nothing moves, set exposures_us to a shorter and a longer exposure",
+                    name, 100 * levels.clipped_share, levels.lit_faintest, levels.full));
+  }
+
   // Recorded frames show the pattern; what another camera sees now depends on the service.
   void check_symbols(const std::string& name, const CameraOptions& options, Camera& camera) {
     const CalibratedCamera* const known = calibration_ ? calibration_->camera(options.name()) : nullptr;
     if (known == nullptr || !pattern_) return;
     const auto frame = camera.capture(std::chrono::steady_clock::now() + kOpenTime);
     if (!frame) return findings_.warn(name + ": no frame: " + to_string(frame.error()));
+    check_light(name, options, frame->image());
     const auto index = static_cast<std::size_t>(known - calibration_->cameras.data());
     const DecodeOptions& decode = configuration_.decode;
     std::size_t read = 0;

@@ -10,6 +10,7 @@
 #include "core/decode/decoder.hpp"
 #include "core/exposure/frame_noise.hpp"
 #include "core/exposure/light_levels.hpp"
+#include "core/exposure/merge_exposures.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/scan/cloud/frame_image.hpp"
@@ -69,6 +70,7 @@ Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding co
 
 // The saturation level of a camera, for all its frames: a guess from a dark frame alone would be too low.
 double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera) {
+  if (set.is_merged(camera)) return kMergedFull;
   const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
   double full = 0;
   for (const auto* frames : {&set.frames, &set.white, &set.dark}) {

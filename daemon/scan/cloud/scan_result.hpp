@@ -56,6 +56,12 @@ struct LostTries {
   std::vector<Error> last;  ///< the newest few, oldest first
 };
 
+/// The outcome for a camera that takes two exposures.
+struct MergedCamera {
+  std::string name;
+  std::string problem;  ///< why its scan uses the shorter exposure alone; empty: both are merged
+};
+
 /// The coding of the frames that are kept beside a cloud.
 enum class FrameCoding { kNone, kRaw, kPng };
 
@@ -101,6 +107,7 @@ struct ScanResult {
   std::string empty = {};                        ///< why no symbol became a point, in words; empty: some did
   CloudFiles files = {};                         ///< the cloud in the requested formats
   LostTries lost = {};
+  std::vector<MergedCamera> merged = {};              ///< one for each camera that takes two exposures
   std::vector<CloudPoint> strays;                     ///< symbols that a knocked rig has displaced: see stray_symbols()
   RegionCounts regions{};                             ///< regions of all cameras, by status
   RuleCounts rules{};                                 ///< the same regions, by the rule that decided

@@ -20,11 +20,13 @@ using std::chrono::steady_clock;
 constexpr auto kLookPeriod = 200ms;
 constexpr auto kPromise = 3s;  // for a step that is quick
 constexpr auto kPausePromise = 10s;
+constexpr auto kExposurePromise = 30s;  // a lost device answers late
 
 }  // namespace
 
-CameraRunner::CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options)
+CameraRunner::CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options, std::vector<double> exposures_us)
     : name_(camera->description().name),
+      exposures_us_(std::move(exposures_us)),
       replays_(camera->description().driver == FileCameraOptions::kDriver),
       backoff_(options),
       camera_(std::move(camera)) {
@@ -79,11 +81,11 @@ tl::unexpected<Error> CameraRunner::fail_not_ready() const {
   return fail(ErrorCode::kTimeout, "the camera did not become ready in time: " + reason, "camera " + name_);
 }
 
-void CameraRunner::begin_capture(MonotonicTime deadline, Exposure exposure, Picture light) {
+void CameraRunner::begin_capture(MonotonicTime deadline, Exposure exposure, Picture light, std::size_t round) {
   {
     const std::lock_guard lock(mutex_);
     answer_.reset();
-    order_ = Order{deadline, exposure, light};
+    order_ = Order{deadline, exposure, light, round};
   }
   changed_.notify_all();
 }
@@ -294,8 +296,15 @@ void CameraRunner::note_lost(const Error& error, std::unique_lock<std::mutex> lo
   spdlog::warn("camera {}: {}; trying again until it opens", name_, error.message);
 }
 
+Result<> CameraRunner::set_exposure(const Order& order) {
+  if (exposures_us_.empty()) return {};
+  heartbeat_.promise(kExposurePromise);
+  return camera_->set_exposure(exposures_us_[order.round]);
+}
+
 void CameraRunner::take_frame(const Order& order) {
   camera_->expect(order.light);
+  if (auto set = set_exposure(order); !set) return note_frame(tl::unexpected(set.error()));
   for (;;) {
     const auto longest = camera_->frame_time_max();
     heartbeat_.promise(longest + kPromise);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -12,6 +13,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "core/result.hpp"
 #include "daemon/scan/rig/device_status.hpp"
@@ -55,7 +57,8 @@ class SequenceGaps {
 /// @thread thread-safe, except the captures, which belong to one thread
 class CameraRunner {
  public:
-  CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options);
+  /// @param exposures_us  exposures of one scan, in their order; empty: one, as the camera opens
+  CameraRunner(std::unique_ptr<Camera> camera, const ScanOptions& options, std::vector<double> exposures_us = {});
   /// Waits for the thread. If the device is gone, closing it may take seconds.
   ~CameraRunner();
   CameraRunner(const CameraRunner&) = delete;
@@ -87,8 +90,13 @@ class CameraRunner {
   [[nodiscard]] Result<> replace(std::unique_ptr<Camera> next, std::unique_ptr<Camera> otherwise,
                                  MonotonicTime deadline);
 
+  /// The exposures of one scan; empty if it has only one.
+  [[nodiscard]] const std::vector<double>& exposures_us() const { return exposures_us_; }
+
   /// Starts the exposure of one frame now. wait_captured() and end_capture() finish the capture.
-  void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh, Picture light = Picture::kPattern);
+  /// @param round  the index of its exposure, if a scan has several
+  void begin_capture(MonotonicTime deadline, Exposure exposure = Exposure::kFresh, Picture light = Picture::kPattern,
+                     std::size_t round = 0);
   /// Waits for the driver's answer. @return whether it has come, or will never come
   [[nodiscard]] bool wait_captured(const WaitLimit& limit, MonotonicTime until);
   /// Makes a driver that has not answered yet do so now.
@@ -102,6 +110,7 @@ class CameraRunner {
     MonotonicTime deadline;
     Exposure exposure = Exposure::kFresh;
     Picture light = Picture::kPattern;
+    std::size_t round = 0;
     bool cancelled = false;
   };
   struct Replacement {
@@ -123,12 +132,14 @@ class CameraRunner {
   void note_lost(const Error& error, std::unique_lock<std::mutex> lock);
   [[nodiscard]] std::optional<Order> next_order(const std::stop_token& stop);
   void take_frame(const Order& order);
+  [[nodiscard]] Result<> set_exposure(const Order& order);
   [[nodiscard]] bool goes_on(const Order& order, const Error& error) const;
   void note_frame(Result<Frame> frame);
   [[nodiscard]] tl::unexpected<Error> give_up();
   [[nodiscard]] tl::unexpected<Error> fail_not_ready() const;
 
   std::string name_;
+  std::vector<double> exposures_us_;
   bool replays_;
   Backoff backoff_;
   Heartbeat heartbeat_;

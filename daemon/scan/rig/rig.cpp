@@ -44,11 +44,13 @@ Error incomplete(Error error, std::size_t cameras) {
 }  // namespace
 
 Rig::Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, Grey8 image,
-         const ScanOptions& options)
+         const ScanOptions& options, const std::vector<std::vector<double>>& exposures_us)
     : projection_(std::move(projector), std::move(image), options), options_(options) {
-  for (auto& camera : cameras) {
-    runners_.push_back(std::make_unique<CameraRunner>(std::move(camera), options));
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    auto exposures = i < exposures_us.size() ? exposures_us[i] : std::vector<double>();
+    runners_.push_back(std::make_unique<CameraRunner>(std::move(cameras[i]), options, std::move(exposures)));
     cameras_.push_back(runners_.back().get());
+    if (!cameras_.back()->exposures_us().empty()) of_two_exposures_.push_back(cameras_.back());
   }
 }
 
@@ -128,7 +130,8 @@ Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
     if (auto ready = camera->wait_ready(shot.limit); !ready) return tl::unexpected(ready.error());
   }
   const MonotonicTime since = shot.exposure == Exposure::kNext ? projection_.visible() : steady_clock::now();
-  for (CameraRunner* camera : cameras) camera->begin_capture(shot.limit.deadline, shot.exposure, shot.light);
+  for (CameraRunner* camera : cameras)
+    camera->begin_capture(shot.limit.deadline, shot.exposure, shot.light, shot.round);
   auto frames = collect(cameras, shot.limit);
   if (!frames) return frames;
   Result<> outcome = check_times(cameras, *frames, since, shot.limit.deadline);
@@ -137,16 +140,37 @@ Result<std::vector<Frame>> Rig::expose(Cameras cameras, const Shot& shot) {
   return frames;
 }
 
-Result<std::vector<Frame>> Rig::take_set(const Shot& shot) {
+Result<std::vector<Frame>> Rig::take_set(Cameras cameras, const Shot& shot) {
   const auto shown =
       show(shot.limit, [&](MonotonicTime end) { return projection_.show(shot.light, end, shot.limit.over); });
   if (!shown) return tl::unexpected(shown.error());
   const bool going_on = std::exchange(changes_before_, projection_.changes()) == projection_.changes();
-  auto frames = expose(cameras_, {shot.limit, going_on ? shot.exposure : Exposure::kFresh, shot.light});
+  // After another exposure, the next frame may still have the one before.
+  const bool may_have_begun = going_on && of_two_exposures_.empty();
+  auto frames =
+      expose(cameras, {shot.limit, may_have_begun ? shot.exposure : Exposure::kFresh, shot.light, shot.round});
   if (!frames) return frames;
-  if (auto aligned = align(*frames, shot); !aligned) return tl::unexpected(aligned.error());
-  if (auto together = check_skew(*frames); !together) return tl::unexpected(together.error());
+  if (auto aligned = align(cameras, *frames, shot); !aligned) return tl::unexpected(aligned.error());
+  if (auto together = check_skew(cameras, *frames); !together) return tl::unexpected(together.error());
   return frames;
+}
+
+// A lost frame costs both exposures, so that little time passes between them.
+Result<> Rig::take_picture(const Shot& shot, FrameSet& set) {
+  auto frames = take_set(cameras_, shot);
+  if (!frames) return tl::unexpected(frames.error());
+  const bool pattern = shot.light == Picture::kPattern, white = shot.light == Picture::kWhite;
+  LongerFrames& longer = pattern ? set.longer : white ? set.longer_white : set.longer_dark;
+  longer.clear();
+  if (!of_two_exposures_.empty()) {
+    auto second = take_set(of_two_exposures_, {shot.limit, Exposure::kFresh, shot.light, 1});
+    if (!second) return tl::unexpected(second.error());
+    auto next = second->begin();
+    for (const CameraRunner* camera : cameras_)
+      camera->exposures_us().empty() ? longer.emplace_back() : longer.emplace_back(std::move(*next++));
+  }
+  (pattern ? set.frames : white ? set.white : set.dark) = std::move(*frames);
+  return {};
 }
 
 bool Rig::only_replays() const {
@@ -159,12 +183,16 @@ Result<FrameSet> Rig::capture(const WaitLimit& limit, Exposure exposure, LightFr
   for (const Picture now : {Picture::kPattern, Picture::kWhite, Picture::kBlack}) {
     if (now == Picture::kWhite && !light.white) continue;
     if (now == Picture::kBlack && !light.dark) continue;
-    auto frames = take_set({limit, exposure, now});
-    while (!frames && limit.again && limit.again(frames.error())) {
-      frames = take_set({limit, Exposure::kFresh, now});
+    auto taken = take_picture({limit, exposure, now}, set);
+    while (!taken && limit.again && limit.again(taken.error())) {
+      taken = take_picture({limit, Exposure::kFresh, now}, set);
     }
-    if (!frames) return tl::unexpected(frames.error());
-    (now == Picture::kPattern ? set.frames : now == Picture::kWhite ? set.white : set.dark) = std::move(*frames);
+    if (!taken) return tl::unexpected(taken.error());
+  }
+  for (const CameraRunner* camera : cameras_) {
+    const std::vector<double>& exposures_us = camera->exposures_us();
+    if (!of_two_exposures_.empty())
+      set.exposure_ratios.push_back(exposures_us.empty() ? 1 : exposures_us.back() / exposures_us.front());
   }
   set.capture_time = steady_clock::now() - begin;
   set.skew = skew_of(set.frames);
@@ -185,11 +213,11 @@ Result<Frame> Rig::capture_one(std::size_t camera, const WaitLimit& limit, bool 
 
 // Cameras in free run begin at any moment of their period. If one began too early for the others, its next frame is
 // closer to theirs.
-Result<> Rig::align(std::vector<Frame>& frames, const Shot& shot) {
+Result<> Rig::align(Cameras cameras, std::vector<Frame>& frames, const Shot& shot) {
   for (std::size_t tries = 0; frames.size() > 1 && tries < kAlignTriesMax; ++tries) {
     const auto first = static_cast<std::size_t>(exposures(frames).min - frames.begin());
-    if (skew_of(frames) <= slack(*cameras_[first])) return {};
-    auto next = expose(Cameras(cameras_).subspan(first, 1), {shot.limit, Exposure::kNext, shot.light});
+    if (skew_of(frames) <= slack(*cameras[first])) return {};
+    auto next = expose(cameras.subspan(first, 1), {shot.limit, Exposure::kNext, shot.light, shot.round});
     if (!next) return tl::unexpected(next.error());
     frames[first] = std::move(next->front());
   }
@@ -217,13 +245,13 @@ Result<> Rig::check_times(Cameras cameras, const std::vector<Frame>& frames, Mon
   return {};
 }
 
-Result<> Rig::check_skew(const std::vector<Frame>& frames) const {
+Result<> Rig::check_skew(Cameras cameras, const std::vector<Frame>& frames) const {
   const auto skew = skew_of(frames);
   if (skew <= std::chrono::milliseconds(options_.exposure_skew_ms)) return {};
   const auto [first, last] = exposures(frames);
-  return fail(ErrorCode::kFrameSkewed, "camera " + cameras_[last - frames.begin()]->name() + " exposed " +
+  return fail(ErrorCode::kFrameSkewed, "camera " + cameras[last - frames.begin()]->name() + " exposed " +
                                            milliseconds_text(skew) + " after camera " +
-                                           cameras_[first - frames.begin()]->name() +
+                                           cameras[first - frames.begin()]->name() +
                                            ", more than [scan] exposure_skew_ms: check the trigger");
 }
 

@@ -33,9 +33,11 @@ namespace slsd {
 /// @thread thread-bound, except request_stop(), stopped(), kept() and the statuses
 class Rig {
  public:
-  /// @param image  the pattern that the projector shows during scans
+  /// @param image         the pattern that the projector shows during scans
+  /// @param exposures_us  by camera: two exposures, the shorter first, or none for a camera that takes one; may be
+  ///                      shorter than the cameras
   Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, Grey8 image,
-      const ScanOptions& options);
+      const ScanOptions& options, const std::vector<std::vector<double>>& exposures_us = {});
 
   /// Opens the projector and shows the current picture; notices a lost projector.
   void supervise() { projection_.supervise(); }
@@ -46,7 +48,7 @@ class Rig {
   [[nodiscard]] bool only_replays() const;
 
   /// Takes one frame of each camera. If cameras run freely, takes the frames with the closest exposures. Takes lost
-  /// frames again if the limit allows.
+  /// frames again if the limit allows. Cameras with two exposures then take the longer one together, of each picture.
   /// @param exposure  kNext: a frame may have begun before the call, but after the pattern was visible and after the
   ///                  previous capture's frames
   /// @param light     exposed after the pattern's frames, white first, each once its own picture is visible
@@ -96,21 +98,24 @@ class Rig {
     const WaitLimit& limit;
     Exposure exposure = Exposure::kFresh;
     Picture light = Picture::kPattern;
+    std::size_t round = 0;  ///< index of the exposure, if cameras take several
   };
   template <class Show>
   [[nodiscard]] Result<> show(const WaitLimit& limit, Show show);
-  [[nodiscard]] Result<std::vector<Frame>> take_set(const Shot& shot);
+  [[nodiscard]] Result<> take_picture(const Shot& shot, FrameSet& set);
+  [[nodiscard]] Result<std::vector<Frame>> take_set(Cameras cameras, const Shot& shot);
   [[nodiscard]] Result<std::vector<Frame>> expose(Cameras cameras, const Shot& shot);
   [[nodiscard]] Result<std::vector<Frame>> collect(Cameras cameras, const WaitLimit& limit);
-  [[nodiscard]] Result<> align(std::vector<Frame>& frames, const Shot& shot);
+  [[nodiscard]] Result<> align(Cameras cameras, std::vector<Frame>& frames, const Shot& shot);
   [[nodiscard]] std::chrono::nanoseconds slack(const CameraRunner& camera) const;
   [[nodiscard]] Result<> check_times(Cameras cameras, const std::vector<Frame>& frames, MonotonicTime since,
                                      MonotonicTime deadline) const;
-  [[nodiscard]] Result<> check_skew(const std::vector<Frame>& frames) const;
+  [[nodiscard]] Result<> check_skew(Cameras cameras, const std::vector<Frame>& frames) const;
 
   Projection projection_;
   std::vector<std::unique_ptr<CameraRunner>> runners_;
   std::vector<CameraRunner*> cameras_;
+  std::vector<CameraRunner*> of_two_exposures_;
   ScanOptions options_;
   std::uint64_t changes_before_ = 0;  ///< the projection's count of changes at the last set of frames
   std::stop_source stopping_;

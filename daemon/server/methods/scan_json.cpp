@@ -48,6 +48,16 @@ void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
                           "reasons; check depth_min_mm, depth_max_mm and the calibration";
 }
 
+// By camera: the number of exposures in its frames, and why not two.
+json exposures_json(const std::vector<MergedCamera>& cameras) {
+  json result = json::object();
+  for (const MergedCamera& camera : cameras) {
+    json& about = result[camera.name] = {{"merged", camera.problem.empty() ? 2 : 1}};
+    if (!camera.problem.empty()) about["problem"] = camera.problem;
+  }
+  return result;
+}
+
 }  // namespace
 
 double latency_ms(MonotonicTime received) {
@@ -77,6 +87,7 @@ json scan_json(const ScanResult& scan, Density density) {
   } else if (!scan.empty.empty()) {
     result["empty"] = scan.empty;
   }
+  if (!scan.merged.empty()) result["exposures"] = exposures_json(scan.merged);
   result["tries"] = scan.lost.count + 1;
   if (scan.lost.count > 0) {
     json lost = json::array();

@@ -101,6 +101,7 @@ json memory_json(const MemoryBudget& memory) {
 json camera_json(const CameraOptions& camera) {
   json about{{"name", camera.name()}, {"driver", camera.driver()}};
   if (const auto exposure_us = camera.exposure_us()) about["exposure_us"] = *exposure_us;
+  if (!camera.exposures_us.empty()) about["exposures_us"] = camera.exposures_us;
   if (const auto gain_db = camera.gain_db()) about["gain_db"] = *gain_db;
   if (!camera.replays()) about["format"] = camera.format();
   return about;

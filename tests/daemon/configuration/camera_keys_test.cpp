@@ -47,6 +47,18 @@ faults = ["drop@3"]
   EXPECT_EQ(camera.faults.size(), 1U);
 }
 
+TEST(ReadConfiguration, TakesTwoExposuresOfEveryDriver) {
+  const std::string both = "exposures_us = [2000, 8000]\n";
+  for (const auto* driver :
+       {"driver = \"v4l2\"\ndevice = \"x\"\n", "driver = \"aravis\"\nid = \"1\"\n", "path = \"x\"\n"}) {
+    const auto configuration = read("[[camera]]\n" + std::string(driver) + both);
+    ASSERT_TRUE(configuration) << to_string(configuration.error());
+    const CameraOptions& camera = configuration->cameras.at(0);
+    EXPECT_THAT(camera.exposures_us, ::testing::ElementsAre(2000, 8000));
+    EXPECT_EQ(camera.exposure_us(), camera.replays() ? std::nullopt : std::optional(2000.0)) << driver;
+  }
+}
+
 TEST(ReadConfiguration, TakesAGainOfV4l2InDecibels) {
   const auto configuration = read("[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\ngain_db = 6\n");
   ASSERT_TRUE(configuration) << to_string(configuration.error());

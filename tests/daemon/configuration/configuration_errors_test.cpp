@@ -51,6 +51,21 @@ TEST(ReadConfiguration, PlacesRangesAtTheKey) {
   EXPECT_THAT(error_of(v4l2 + "width_px = 640\n"), HasSubstr("needs height_px"));
 }
 
+TEST(ReadConfiguration, RefusesExposuresThatCannotBeMerged) {
+  const std::string camera = "[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\n";
+  for (const auto* wrong : {"[]", "[2000]", "2000", "[2000, 4000, 8000]", "[8000, 2000]", "[2000, 2000]",
+                            "[2000, 2900]", "[10, 1001]", "[0.5, 100]", "[200000, 2000000]", "[2000, -8000]", "[0, 0]"})
+    EXPECT_THAT(error_of(camera + "exposures_us = " + wrong + "\n"),
+                HasSubstr("slsd.toml:4:16: [[camera]] exposures_us "))
+        << wrong;
+  EXPECT_THAT(error_of(camera + "exposures_us = [\"a\", 5]\n"), HasSubstr("must be a number or a list of numbers"));
+  EXPECT_THAT(error_of(camera + "exposures_us = [2000, 8000]\nexposure_us = 2000\n"), HasSubstr("leave one out"));
+  EXPECT_THAT(error_of(camera + "exposures_us = [2000, 8000]\nautomatic = true\n"),
+              HasSubstr("exposures_us cannot be set while automatic is true"));
+  EXPECT_THAT(error_of(camera + "exposures_us = [2000, 8000]\nframes_held_max = 5\n"),
+              HasSubstr("exposures_us needs frames_held_max of 6 or more"));
+}
+
 TEST(ReadConfiguration, RefusesAReachOfRunsThatTheMethodDoesNotPromise) {
   EXPECT_THAT(error_of("[pattern]\nmethod = \"constructive\"\nrow_reach = 40\n"),
               HasSubstr("row_reach and column_reach need method = \"no_repeats\""));

@@ -37,6 +37,8 @@ TEST(ExposureWarnings, ThinkOfTheLampsWhereTheyAreKnown) {
   EXPECT_THAT(warnings_for(lamps + camera("exposure_us = 12000\n")),
               ElementsAre(HasSubstr(", nor of half a lamp period")));
   EXPECT_THAT(warnings_for(lamps + camera("exposure_us = 50000\n")), IsEmpty());
+  EXPECT_THAT(warnings_for(camera("exposures_us = [16700, 40000]\n")),
+              ElementsAre(HasSubstr("of exposures_us, 40000 is not a whole multiple")));
 }
 
 TEST(ExposureWarnings, AreNoneWhereNothingIsWrong) {
