@@ -27,6 +27,9 @@ constexpr float kSigmaMaxPx = 0.3F;
 constexpr float kGainSlopeMax = 0.08F;  // share of the gain, for one camera px
 constexpr float kContrastMin = 4;       // ratio of the gain to the noise of a pixel
 
+/// Ratio of the fit's standard deviation under normal noise to that from the weighted residual: outlying pixels count
+/// less, so the residual is smaller than the noise (Huber 1981, for the weights of AlignOptions::outlier_sigmas = 4).
+constexpr float kOfResidual = 1.07F;
 /// Parts of sigma, as for symbols (docs/notes/2026-11-decoder.md).
 constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
 
@@ -114,8 +117,8 @@ bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, Surface
   const auto squares = [](float x, float y) { return x * x + y * y; };
   if (squares(found.gain_x, found.gain_y) > kGainSlopeMax * kGainSlopeMax * found.gain * found.gain) return false;
   if (std::abs(found.slope_x) > kSlopeMax || std::abs(found.slope_y) > kSlopeMax) return false;
-  node.noise_px = std::sqrt(task.variance) * task.residual;
-  node.slope_noise = std::sqrt(task.slope_variance) * task.residual;
+  node.noise_px = kOfResidual * std::sqrt(task.variance) * task.residual;
+  node.slope_noise = kOfResidual * std::sqrt(task.slope_variance) * task.residual;
   node.sigma_px = std::sqrt(kLeastPx * kLeastPx + node.noise_px * node.noise_px +
                             kOfScatter * kOfScatter * task.scatter * task.scatter);
   if (!(node.sigma_px < kSigmaMaxPx)) return false;
@@ -325,15 +328,29 @@ constexpr float kFuseSigmas = 3;
 /// over its noise. Beyond them there is relief, and the mean covers fewer nodes.
 constexpr float kFuseExcess = 0.8F, kFlat = 0.7F;
 /// Error that no mean reduces, px: focus and lenses differ slightly from the pattern's modelled blur.
-constexpr float kFloorPx = 0.008F;
+constexpr float kFloorPx = 0.005F;
 /// Factors of the neighbours' disagreement on a bend. A plane continued by a stride is off by half the bend times the
 /// stride squared. A window's own plane is off by a 24th of the bend times the window squared. So the disagreement
 /// measures the error.
 constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.5F, kOfDisagreementMost = 4;
 /// Share of the noise in the squared disagreement that is no relief.
 constexpr float kOfNoise = 0.6F;
-/// Share of the variance that remains if the mean has this reach.
-constexpr float kLeftOfVariance[kFuseReach] = {0.75F, 0.27F};
+/// Factor of the variance of a mean over that of white noise: edges are uneven within the windows, and correcting bends
+/// adds noise.
+constexpr float kOfMean = 1.45F;
+/// The share of the variance of noise that the mean of nodes leaves: windows of w px each, s px apart, weigh the pixels
+/// along each axis by the sum of their boxes.
+float left_of_variance(int reach, int window_px, int stride_px) {
+  const int nodes = 2 * reach + 1, all = (nodes - 1) * stride_px + window_px;
+  float squares = 0;
+  for (int x = 0; x < all; ++x) {
+    int windows = 0;
+    for (int node = 0; node < nodes; ++node) windows += x >= node * stride_px && x < node * stride_px + window_px;
+    squares += static_cast<float>(windows * windows);
+  }
+  const float along = squares / static_cast<float>(nodes * nodes * window_px);
+  return std::min(1.F, kOfMean * along * along);
+}
 
 /// Factor for the shared errors of adjacent slopes, whose windows overlap: larger for the smaller reach.
 constexpr float kOverlap[kFuseReach] = {9, 3};
@@ -350,7 +367,8 @@ struct Fusing {
   const float* around[7];
   std::ptrdiff_t row;  // distance between rows
   float stride, of_bend, of_disagreement;
-  float beyond;  // factor of the bend correction
+  float beyond;            // factor of the bend correction
+  float left[kFuseReach];  // see left_of_variance()
 };
 enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
 
@@ -449,7 +467,7 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
     const IntLanes holds = (2 * mean.count > zero + all) & (mean.squares < kFuseExcess * kFuseExcess * mean.expected) &
                            (lift * lift < kFlat * kFlat * own_noise);
     const Lanes per_weight = one / (mean.weights + 1e-20F);
-    fused.left = holds ? zero + kLeftOfVariance[reach - 1] : fused.left;
+    fused.left = holds ? zero + in.left[reach - 1] : fused.left;
     fused.off = holds ? mean.values * per_weight : fused.off;
     fused.slope_x = holds ? mean.slopes_x * per_weight : fused.slope_x;
     fused.slope_y = holds ? mean.slopes_y * per_weight : fused.slope_y;
@@ -490,7 +508,10 @@ void SurfaceGrid::fuse(Executor& executor) {
         static_cast<float>(options_.stride_px),
         side * side / 24,
         std::clamp(kOfBendLeft * side * side / (12 * stride * stride), kOfDisagreementLeast, kOfDisagreementMost),
-        std::min(kBeyondMost, kBendBeyond + kWindowBeyond * side * side / (stride * stride))};
+        std::min(kBeyondMost, kBendBeyond + kWindowBeyond * side * side / (stride * stride)),
+        {}};
+    for (int reach = 1; reach <= kFuseReach; ++reach)
+      fusing.left[reach - 1] = left_of_variance(reach, options_.window_px, options_.stride_px);
     SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
     for (int column = 0; column < columns_; column += kLanes) {
       const int count = std::min(kLanes, columns_ - column);
