@@ -55,6 +55,18 @@ class Gige(unittest.TestCase):
         self.assertGreater(result["points"], 2000)
         self.assertEqual(status["cameras"][0]["driver"], "aravis")
 
+    def test_takes_two_exposures(self):
+        """The double takes them, and its chunks have them, but its scene is as bright in both."""
+        double = Double()
+        self.addCleanup(double.close)
+        with service_on(double, "exposures_us = [2000, 8000]") as service, service.client() as client:
+            result = scan_until_it_works(client)[2]
+            lost = client.call("status")[0]["cameras"][0]["frames_lost"]
+        self.assertGreater(result["points"], 2000)
+        self.assertEqual(result["exposures"]["camera"]["merged"], 1)
+        self.assertIn("1.00 times as bright", result["exposures"]["camera"]["problem"])
+        self.assertEqual(lost, 0)
+
     def test_scans_again_after_a_power_failure(self):
         self.recovers(self.double.unplug, self.double.plug_in)
 

@@ -14,7 +14,7 @@ file = "{scene}/pattern.toml"
 name = "camera"
 driver = "v4l2"
 device = "{device}"
-exposure_us = 10000.0
+{exposure}
 gain_steps = 20
 [calibration]
 file = "{scene}/calibration.yml"
@@ -51,8 +51,8 @@ class Double:
         return self.process.wait()
 
 
-def service_on(double):
-    return Service(configuration=CONFIGURATION.format(scene=SCENE, device=double.device))
+def service_on(double, exposure="exposure_us = 10000.0"):
+    return Service(configuration=CONFIGURATION.format(scene=SCENE, device=double.device, exposure=exposure))
 
 
 def can_mount():

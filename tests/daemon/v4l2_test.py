@@ -40,6 +40,16 @@ class V4l2(unittest.TestCase):
             status, _ = client.call("status")
         self.assertEqual(status["cameras"][0]["driver"], "v4l2")
 
+    def test_takes_two_exposures(self):
+        """The double takes them, but its scene is as bright in both."""
+        double = Double()
+        self.addCleanup(double.close)
+        with service_on(double, "exposures_us = [2000, 8000]") as service, service.client() as client:
+            result = scan_until_it_works(client)[2]
+        self.assertGreater(result["points"], 2000)
+        self.assertEqual(result["exposures"]["camera"]["merged"], 1)
+        self.assertIn("1.00 times as bright", result["exposures"]["camera"]["problem"])
+
     def expect(self, name, fault, remedy, **params):
         """Scans fail with the name while the fault lasts; and work again after it."""
         self.double.tell(fault)
