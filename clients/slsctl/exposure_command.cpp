@@ -71,13 +71,13 @@ std::string text_of(const SeenLight& seen) {
 }  // namespace
 
 tl::expected<json, Failure> look_at_exposure(const ClientOptions& options) {
-  const auto seen = look_at_light(options);
+  const auto seen = look_at_light(options, LookAtPitch::kNo);
   if (!seen) return tl::unexpected(seen.error());
   return to_json(*seen);
 }
 
 int exposure_command(const ClientOptions& options) {
-  const auto seen = look_at_light(options);
+  const auto seen = look_at_light(options, LookAtPitch::kNo);
   if (!seen) return report(options, seen.error());
   std::cout << (options.json ? to_line(to_json(*seen)) : text_of(*seen));
   return kDone;

@@ -30,6 +30,11 @@ json gamma_json(const std::optional<CameraGamma>& gamma) {
   return {{"likeliest", gamma->likeliest}, {"low", gamma->low}, {"high", gamma->high}};
 }
 
+json pitch_json(const std::optional<PatternPitch>& pitch) {
+  if (!pitch) return nullptr;
+  return {{"pitch_px", pitch->pitch_px}, {"unevenness_px", pitch->unevenness_px}};
+}
+
 json change_json(const std::optional<FrameChange>& change) {
   if (!change) return nullptr;
   return {{"noise", change->noise},
@@ -57,6 +62,7 @@ json light_json(const SeenLight& seen) {
           {"noise_levels", noise_levels_json(light.between)},
           {"grain", neighbours ? json(*neighbours) : json()},
           {"gamma", gamma_json(light.gamma)},
+          {"pitch", pitch_json(light.pitch)},
           {"change", change_json(light.change)},
           {"troubles", troubles_json(seen.advice.troubles)}};
 }
@@ -91,9 +97,16 @@ std::string change_text(const FrameLight& light) {
                      100 * (change.brighter - 1), 100 * change.bands, 100 * change.moved_share);
 }
 
+std::string pitch_text(const FrameLight& light) {
+  if (!light.pitch) return "pitch         not measurable: no scan, or too few symbols in it\n";
+  return fmt::format("pitch         {:.2f} px from column to column, uneven by {:.3f} px\n", light.pitch->pitch_px,
+                     light.pitch->unevenness_px);
+}
+
 std::string light_text(const SeenLight& seen) {
   const std::string camera = seen.camera.empty() ? "" : fmt::format("camera        \"{}\"\n", printable(seen.camera));
-  return camera + levels_text(seen.light) + change_text(seen.light) + troubles_text(seen.advice.troubles);
+  return camera + levels_text(seen.light) + change_text(seen.light) + pitch_text(seen.light) +
+         troubles_text(seen.advice.troubles);
 }
 
 tl::expected<void, Failure> write_light_picture(const ClientOptions& options, const SeenLight& seen) {
@@ -107,7 +120,7 @@ tl::expected<void, Failure> write_light_picture(const ClientOptions& options, co
 
 int light_command(const ClientOptions& options) {
   if (auto writable = check_outputs(options); !writable) return report(options, writable.error());
-  const auto seen = look_at_light(options);
+  const auto seen = look_at_light(options, LookAtPitch::kYes);
   if (!seen) return report(options, seen.error());
   if (auto written = write_light_picture(options, *seen); !written) return report(options, written.error());
   words(options) << (options.json ? to_line(light_json(*seen)) : light_text(*seen));

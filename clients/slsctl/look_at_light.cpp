@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "clients/connection/connection.hpp"
+#include "core/cloud/ply.hpp"
 #include "core/image_size.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/read_image.hpp"
@@ -48,7 +49,32 @@ ExposureLimits limits_of(const json& settings, const ClientOptions& options) {
   return limits;
 }
 
-tl::expected<SeenLight, Failure> ask_service(const ClientOptions& options) {
+// Cameras have the configuration's order in a cloud.
+int number_of(const json& settings, const std::string& name) {
+  int number = 0;
+  for (const json& camera : settings.value("cameras", json::array())) {
+    if (name.empty() || camera.value("name", "") == name) break;
+    ++number;
+  }
+  return number;
+}
+
+std::optional<PatternPitch> scan_pitch(Connection& connection, const json& settings, const ClientOptions& options) {
+  json params{{"format", "ply"}, {"density", "symbols"}};
+  if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
+  const auto answered = ask(connection, "scan", params);
+  if (!answered) return std::nullopt;
+  const auto cloud = read_ply(answered->reply.bytes, "the service's cloud");
+  if (!cloud) return std::nullopt;
+  const int camera = number_of(settings, options.camera);
+  std::vector<SymbolPlace> symbols;
+  for (const CloudPoint& point : cloud->points) {
+    if (point.camera == camera) symbols.push_back({point.column, point.row, point.camera_u});
+  }
+  return measure_pitch(symbols);
+}
+
+tl::expected<SeenLight, Failure> ask_service(const ClientOptions& options, LookAtPitch pitch) {
   auto connection = Connection::open(options.socket);
   if (!connection) return tl::unexpected(failure(connection.error()));
   const auto settings = ask(*connection, "settings", json::object());
@@ -66,6 +92,7 @@ tl::expected<SeenLight, Failure> ask_service(const ClientOptions& options) {
   const GreyView frame = view(seen.frame);
   seen.light = measure_frame_light(frame, view(*second), full_level(camera.value("format", ""), frame));
   seen.light.exposure_is_configured = seen.present || camera.value("driver", "") == "file";
+  if (pitch == LookAtPitch::kYes) seen.light.pitch = scan_pitch(*connection, told, options);
   seen.advice = advise_exposure(seen.light, seen.present, limits_of(told, options));
   return seen;
 }
@@ -97,8 +124,8 @@ tl::expected<SeenLight, Failure> read_files(const ClientOptions& options) {
 
 }  // namespace
 
-tl::expected<SeenLight, Failure> look_at_light(const ClientOptions& options) {
-  return options.from.empty() ? ask_service(options) : read_files(options);
+tl::expected<SeenLight, Failure> look_at_light(const ClientOptions& options, LookAtPitch pitch) {
+  return options.from.empty() ? ask_service(options, pitch) : read_files(options);
 }
 
 std::string troubles_text(const std::vector<Trouble>& troubles) {

@@ -25,8 +25,12 @@ struct SeenLight {
   ExposureAdvice advice;
 };
 
-/// Takes two frames of the camera one after the other, or reads the files of --from.
-[[nodiscard]] tl::expected<SeenLight, Failure> look_at_light(const ClientOptions& options);
+/// Whether to scan as well, for what only decoded symbols show: the pattern's pitch.
+enum class LookAtPitch : bool { kNo, kYes };
+
+/// Takes two frames of the camera one after the other, or reads the files of --from. If a scan fails, as without a
+/// calibration, the pitch is not measured.
+[[nodiscard]] tl::expected<SeenLight, Failure> look_at_light(const ClientOptions& options, LookAtPitch pitch);
 
 /// The troubles with their remedies, each on a line.
 [[nodiscard]] std::string troubles_text(const std::vector<Trouble>& troubles);

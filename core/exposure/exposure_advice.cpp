@@ -54,6 +54,7 @@ void find_troubles(const FrameLight& light, std::vector<Trouble>& troubles) {
   note(levels.lit_brightest > kUnevenMax * std::max(levels.lit_faintest, 1.0), Trouble::kUneven);
   note(change && change->moved_share > kMovedMax, Trouble::kMoves);
   note(flickers, light.exposure_is_configured ? Trouble::kFlickers : Trouble::kAutomaticExposure);
+  note(light.pitch && light.pitch->is_uneven(), Trouble::kUnevenPitch);
   note(!flickers && light.between.neighbours > kGrainMax, Trouble::kGrain);
   note(!flickers && light.gamma && light.gamma->bends(), Trouble::kGamma);
 }
@@ -113,6 +114,8 @@ std::string_view to_string(Trouble trouble) {
       return "gamma";
     case Trouble::kAutomaticExposure:
       return "automatic_exposure";
+    case Trouble::kUnevenPitch:
+      return "uneven_pitch";
   }
   return {};
 }
@@ -157,6 +160,9 @@ std::string_view remedy(Trouble trouble) {
     case Trouble::kAutomaticExposure:
       return "the brightness changes from frame to frame, and no exposure is configured: set exposure_us of this "
              "[[camera]], so that the camera does not choose it itself";
+    case Trouble::kUnevenPitch:
+      return "the columns of symbols are unequally wide, as if the projector scaled its picture: use its native "
+             "resolution, and turn off keystone correction, zoom and overscan";
   }
   return {};
 }

@@ -26,8 +26,9 @@ enum class Trouble {
   kGrain,              ///< neighbouring pixels share their noise, as compression and denoising leave it
   kGamma,              ///< grey levels are not proportional to light
   kAutomaticExposure,  ///< the brightness changes from frame to frame, and the exposure is not configured
+  kUnevenPitch,        ///< the projector scales its picture, so that columns of symbols are unequally wide
 };
-inline constexpr int kTroubleCount = 13;
+inline constexpr int kTroubleCount = 14;
 
 /// "ambient", as in the JSON of slsctl exposure.
 [[nodiscard]] std::string_view to_string(Trouble trouble);

@@ -10,6 +10,7 @@
 #include "core/exposure/frame_noise.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/exposure/noise_between.hpp"
+#include "core/exposure/pattern_pitch.hpp"
 #include "core/exposure/tile.hpp"
 
 namespace slsd {
@@ -22,6 +23,7 @@ struct FrameLight {
   std::optional<FrameChange> change = {};  ///< to the second frame, if there is one
   NoiseBetween between = {};               ///< noise between both frames
   std::optional<CameraGamma> gamma = {};   ///< empty: not measurable
+  std::optional<PatternPitch> pitch = {};  ///< of a scan's symbols; empty: not measured
   bool exposure_is_configured = true;      ///< if not, the camera may choose it itself
 
   /// One standard deviation of a pixel's noise: between the frames if they differ, else within the first.

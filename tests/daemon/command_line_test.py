@@ -598,8 +598,9 @@ class Slsctl(unittest.TestCase):
         self.assertLess(seen["edge_px"], 0.075 * seen["period_px"])
         self.assertLess(seen["room_light"], 0.5)
         self.assertEqual(seen["clipped_of_lit"], 0)
+        self.assertLess(seen["pitch"]["unevenness_px"], 0.005 * seen["pitch"]["pitch_px"])
         told = self.slsctl("light").stdout
-        for line in ("blur   ", "clipped   ", "room light   ", "noise   ", "grain   ", "gamma   ", "change   "):
+        for line in ("blur   ", "clipped   ", "room light   ", "noise   ", "grain   ", "gamma   ", "change   ", "pitch   "):
             self.assertIn("\n" + line, told)
 
     def test_light_reads_files_without_a_service(self):

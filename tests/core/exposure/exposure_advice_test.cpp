@@ -146,13 +146,15 @@ TEST(AdviseExposure, NamesTheCamerasOwnTroubles) {
   EXPECT_THAT(troubles(darker), ElementsAre(Trouble::kAutomaticExposure));
 }
 
-TEST(AdviseExposure, NamesClippedSymbolsAndBands) {
+TEST(AdviseExposure, NamesClippedSymbolsBandsAndUnevenPitch) {
   const Grey8 frame = corpus_frame("16px-5-plane_30");
   const auto clipped = advise_exposure({.levels = measure_light(exposed(frame, 4).view(), 255)}, {}, {});
   EXPECT_THAT(clipped.troubles, ElementsAre(Trouble::kClipped));
   EXPECT_TRUE(clipped.look_again);
   FrameLight bands{.levels = measure_light(frame.view(), 255), .change = FrameChange{.bands = 0.05}};
   EXPECT_THAT(advise_exposure(bands, {}, {}).troubles, ElementsAre(Trouble::kFlickers));
+  FrameLight scaled{.levels = measure_light(frame.view(), 255), .pitch = PatternPitch{12, 0.1}};
+  EXPECT_THAT(advise_exposure(scaled, {}, {}).troubles, ElementsAre(Trouble::kUnevenPitch));
   bands.between.neighbours = 0.5;  // of the lamps
   EXPECT_THAT(advise_exposure(bands, {}, {}).troubles, ElementsAre(Trouble::kFlickers));
 }
