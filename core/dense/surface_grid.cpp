@@ -25,7 +25,6 @@ constexpr float kStepMaxPx = 0.8F;    // from the neighbour's plane: within the 
 constexpr float kSlopeMax = 0.5F;     // projector px for one camera px: steeper faces show too little of the pattern
 constexpr float kSigmaMaxPx = 0.3F;
 constexpr float kGainSlopeMax = 0.08F;  // share of the gain, for one camera px
-constexpr float kContrastMin = 4;       // ratio of the gain to the noise of a pixel
 
 /// Ratio of the fit's standard deviation under normal noise to that from the weighted residual: outlying pixels count
 /// less, so the residual is smaller than the noise (Huber 1981, for the weights of AlignOptions::outlier_sigmas = 4).
@@ -108,11 +107,10 @@ void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batc
   }
 }
 
-bool SurfaceGrid::accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const {
+bool SurfaceGrid::accept(const PatchTask& task, SurfaceNode& node) const {
   if (task.failed || task.support < kSupportMin) return false;
   const PatchState& found = task.state;
-  const float noise = frame.noise.at(found.offset + 0.5F * found.gain);
-  if (task.residual > kResidualMax * found.gain || found.gain < kContrastMin * noise) return false;
+  if (task.residual > kResidualMax * found.gain) return false;
   if (std::abs(found.disparity) > kStepMaxPx) return false;
   const auto squares = [](float x, float y) { return x * x + y * y; };
   if (squares(found.gain_x, found.gain_y) > kGainSlopeMax * kGainSlopeMax * found.gain * found.gain) return false;
@@ -165,7 +163,7 @@ BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const PatternField& 
   for (std::size_t i = 0; i < seen.tried; ++i) {
     SurfaceNode node;
     const PatchTask& task = batches_[0].tasks[i];
-    if (!accept(frame, task, node)) continue;
+    if (!accept(task, node)) continue;
     ++seen.aligned;
     blur_meter_.add(frame.pixels, frame.full, field, kAlign,
                     {.patch = task, .window_px = options_.window_px, .square_half_px = kEverywherePx});
@@ -193,7 +191,7 @@ void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternFie
       for (std::size_t i = 0; i < count; ++i) {
         SurfaceNode node;
         const PatchTask& task = batch.tasks[i];
-        if (!accept(frame, task, node)) continue;
+        if (!accept(task, node)) continue;
         const Eigen::Vector2f from_middle = task.map.middle_px - epipolar_.middle_px;
         offsets_.emplace_back(from_middle.x(), from_middle.y(), epipolar_.at(task.map.middle_px) + node.across);
       }
@@ -309,7 +307,7 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field
       }
       align(frame, field, batch, active);
       for (std::size_t i = 0; i < in_part; ++i)
-        accepted_[first + i] = accept(frame, batch.tasks[i], nodes_[front_[first + i].node]);
+        accepted_[first + i] = accept(batch.tasks[i], nodes_[front_[first + i].node]);
     });
     for (const Attempt& attempt : front_) pending_[attempt.node] = -1;
     for (std::size_t i = 0; i < front_.size(); ++i) {

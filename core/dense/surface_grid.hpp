@@ -190,7 +190,7 @@ class SurfaceGrid {
   }
   [[nodiscard]] bool begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const;
   void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const;
-  [[nodiscard]] bool accept(const DenseFrame& frame, const PatchTask& task, SurfaceNode& node) const;
+  [[nodiscard]] bool accept(const PatchTask& task, SurfaceNode& node) const;
   std::size_t align_some(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                          std::size_t first, std::size_t step, Batch& batch);
   void offer(const Attempt& attempt);
