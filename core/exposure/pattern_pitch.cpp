@@ -27,7 +27,7 @@ std::optional<double> place_at(const Cells& cells, int column, int row) {
   return found == cells.end() ? std::nullopt : std::optional(found->second);
 }
 
-/// From the cubic through the two neighbours on either side.
+/// Computes how far a symbol lies from the cubic through the two neighbours on either side.
 std::optional<double> displacement(const Cells& cells, int column, int row, double x) {
   const auto far_left = place_at(cells, column - 2, row), left = place_at(cells, column - 1, row);
   const auto right = place_at(cells, column + 1, row), far_right = place_at(cells, column + 2, row);
