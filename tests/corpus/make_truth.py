@@ -109,15 +109,16 @@ def encode_png(image):
     return min((cv2.imencode('.png', image, level + [s])[1].tobytes() for s in strategies), key=len)
 
 
-def story(scene, pattern, window):
+def story(scene, light, pattern, window):
     settings = ''.join(f' --set {key}={json.dumps(value, separators=(",", ":"))}'
                        for key, value in scene['overrides'].items())
+    lighting = f'light.py DARK {light["profile"]} OUT --seed {light["seed"]}\n' if light else ''
     cutting = f' --window {" ".join(map(str, window))}' if window else ''
     return (f'scene: {scene["scene"]}\n{scene["difficulty"]}\npattern: {pattern.stem}\nseed: {scene["seed"]}\n'
             f'jitter: {scene["jitter"]}\n\n'
             f'render_scene.py --pattern {pattern.stem}.png --scene {scene["scene"]} --seed {scene["seed"]} '
-            f'--jitter {scene["jitter"]}{settings} --out OUT\n'
-            f'make_truth.py OUT --pattern config/patterns/{pattern.name} --to SCENE{cutting}\n')
+            f'--jitter {scene["jitter"]}{settings}{" --extra" if light else ""} --out {"DARK" if light else "OUT"}\n'
+            f'{lighting}make_truth.py OUT --pattern config/patterns/{pattern.name} --to SCENE{cutting}\n')
 
 
 def main():
@@ -145,7 +146,9 @@ def main():
     (options.to / 'frame.png').write_bytes(encode_png(frame))
     (options.to / 'calibration.yml').write_text(calibration)
     (options.to / 'truth.csv').write_text('\n'.join([HEADER] + [line for line in lines if line]) + '\n')
-    (options.to / 'scene.txt').write_text(story(scene, options.pattern, options.window))
+    lit = options.rendered / 'light.json'
+    light = json.loads(lit.read_text()) if lit.exists() else None
+    (options.to / 'scene.txt').write_text(story(scene, light, options.pattern, options.window))
     link = options.to / 'pattern.toml'
     link.unlink(missing_ok=True)
     link.symlink_to(os.path.relpath(options.pattern, options.to))
