@@ -259,8 +259,8 @@ Grey16 as_merged(const GreyView& frame, double full) {
   Grey16 merged(width, height);
   const float scale = scale_to_merged(full);
   const auto convert = [&]<class T>(const ImageView<T>& image) {
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
         const T level = image.at(x, y);
         merged.at(x, y) =
             level >= full ? static_cast<std::uint16_t>(kMergedFull) : merged_level(dithered(level, x, y) * scale);

@@ -183,6 +183,7 @@ class V4l2DoubleTest : public test::V4l2Test {
  protected:
   bool open_blocking() {
     DoubleOptions options = test::triggered_double();
+    options.controls = test::uvc_controls();
     if (!make(options)) return false;
     file_ = open(double_->path().c_str(), O_RDWR | O_CLOEXEC);
     return file_ >= 0;
