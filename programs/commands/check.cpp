@@ -12,6 +12,7 @@
 #include "clients/connection/connection.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/dense/dense_outlook.hpp"
+#include "core/exposure/exposure_advice.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/exposure/merge_exposures.hpp"
 #include "core/image_size.hpp"
@@ -292,7 +293,10 @@ class Check {
   }
 
   void check_light(const std::string& name, const CameraOptions& options, const GreyView& frame) {
-    const LightLevels levels = measure_light(frame, guess_full_level(frame));
+    const FrameLight light = measure_frame_light(frame, std::nullopt, guess_full_level(frame));
+    for (const Trouble trouble : advise_exposure(light, std::nullopt, {}).troubles)
+      findings_.warn(fmt::format("{}: {}: {}", name, to_string(trouble), remedy(trouble)));
+    const LightLevels& levels = light.levels;
     if (!options.exposures_us.empty() || !needs_second_exposure(levels)) return;
     findings_.warn(
         fmt::format("{}: symbols are clipped in {:.0f} % of the pattern, while the faintest reach {:.0f} of "

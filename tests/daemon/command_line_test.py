@@ -204,6 +204,11 @@ class Slsd(unittest.TestCase):
         self.file.write_text("[[camera]]\ndriver = 'v4l2'\ndevice = '/nothing'\nexposure_us = 20000\n", encoding="utf-8")
         self.assertIn("set 16667 or 33333", slsd("--check", "--config", self.file).stdout)
 
+    def test_check_names_the_troubles_of_the_light(self):
+        troubled = Service(camera_path=write_clipped(self.folder / "clipped.pgm"), camera=COARSE)
+        self.assertIn('warning  camera "camera": clipped: symbols are clipped', slsd("--check", "--config", troubled.file).stdout)
+        self.assertNotRegex(slsd("--check", "--config", Service(camera=COARSE).file).stdout, "clipped|blurred|ambient|no_pattern")
+
     def test_check_of_a_running_service_is_no_error(self):
         with Service(camera=COARSE) as service:
             service.wait_ready()
