@@ -25,7 +25,7 @@ struct SeenLight {
   ExposureAdvice advice;
 };
 
-/// Whether to scan as well, for what only decoded symbols show: the pattern's pitch.
+/// Adds a scan, for what only decoded symbols show: the pattern's pitch.
 enum class LookAtPitch : bool { kNo, kYes };
 
 /// Takes two frames of the camera one after the other, or reads the files of --from. If a scan fails, as without a

@@ -39,8 +39,11 @@ float ToneCurve::light_of(float level, double full) const {
   return static_cast<float>(kFull) * std::pow(share, 1 / power_);
 }
 
-std::uint8_t ToneCurve::level_of(std::uint8_t light) const {
-  return static_cast<std::uint8_t>(std::lround(255 * std::pow(static_cast<float>(light) / 255, power_)));
+std::array<std::uint8_t, 256> ToneCurve::levels_of_lights() const {
+  std::array<std::uint8_t, 256> levels;
+  for (std::size_t light = 0; light < levels.size(); ++light)
+    levels[light] = static_cast<std::uint8_t>(std::lround(255 * std::pow(static_cast<float>(light) / 255, power_)));
+  return levels;
 }
 
 }  // namespace slsd

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -26,8 +27,8 @@ class ToneCurve {
   [[nodiscard]] const Grey16& light_of(const GreyView& frame, double full);
   /// Light of a level, kFull at the full level; any level if the curve is straight.
   [[nodiscard]] float light_of(float level, double full) const;
-  /// The level of a light, both 0 to 255.
-  [[nodiscard]] std::uint8_t level_of(std::uint8_t light) const;
+  /// The levels of the lights 0 to 255, likewise of 255.
+  [[nodiscard]] std::array<std::uint8_t, 256> levels_of_lights() const;
 
  private:
   float power_ = 1;

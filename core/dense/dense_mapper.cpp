@@ -199,9 +199,10 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   cleaner_.drop_small_components(map_, patch, seeds_);
   cleaner_.prune(map_, fixed_->decode.dense.prune_px, patch);
   cleaner_.drop_beyond_the_light(map_);
-  if (!tone_.is_straight())
-    std::ranges::transform(map_.intensity, map_.intensity.begin(),
-                           [&](std::uint8_t light) { return tone_.level_of(light); });
+  if (!tone_.is_straight()) {
+    const auto levels = tone_.levels_of_lights();
+    for (std::uint8_t& intensity : map_.intensity) intensity = levels[intensity];
+  }
   map_.count_pixels();
   if (next) follower_.finish(map_, grid_);
   done(DenseStage::kClean);

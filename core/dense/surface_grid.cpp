@@ -365,8 +365,8 @@ struct Fusing {
   const float* around[7];
   std::ptrdiff_t row;  // distance between rows
   float stride, of_bend, of_disagreement;
-  float beyond;            // factor of the bend correction
-  float left[kFuseReach];  // see left_of_variance()
+  float beyond;       // factor of the bend correction
+  const float* left;  // for each reach, see left_of_variance()
 };
 enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
 
@@ -499,6 +499,9 @@ void SurfaceGrid::fuse(Executor& executor) {
     }
   });
   const auto side = static_cast<float>(options_.window_px), stride = static_cast<float>(options_.stride_px);
+  std::array<float, kFuseReach> left;
+  for (int reach = 1; reach <= kFuseReach; ++reach)
+    left[reach - 1] = left_of_variance(reach, options_.window_px, options_.stride_px);
   executor.run(rows_, [&](int at_row, int) {
     Fusing fusing{
         {},
@@ -507,9 +510,7 @@ void SurfaceGrid::fuse(Executor& executor) {
         side * side / 24,
         std::clamp(kOfBendLeft * side * side / (12 * stride * stride), kOfDisagreementLeast, kOfDisagreementMost),
         std::min(kBeyondMost, kBendBeyond + kWindowBeyond * side * side / (stride * stride)),
-        {}};
-    for (int reach = 1; reach <= kFuseReach; ++reach)
-      fusing.left[reach - 1] = left_of_variance(reach, options_.window_px, options_.stride_px);
+        left.data()};
     SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
     for (int column = 0; column < columns_; column += kLanes) {
       const int count = std::min(kLanes, columns_ - column);
