@@ -19,7 +19,7 @@ core_packages=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libexpe
 test_packages=(tzdata cyclonedds-dev cyclonedds-tools python3 python3-venv python3-numpy python3-prometheus-client python3-yaml mypy
   systemd poppler-utils librsvg2-bin fuse3 xvfb xserver-xorg-core xserver-xorg-video-dummy x11-xserver-utils
   chromium chromium-driver libjs-three python3-markdown python3-matplotlib mandoc zsh fish
-  liburdfdom-tools python3-setuptools)
+  liburdfdom-tools python3-setuptools assimp-utils)
 site_packages=(python3 python3-markdown mandoc)
 lint_packages=(git clang-format clang-tidy shellcheck)
 fuzz_packages=(clang libclang-rt-14-dev)
@@ -37,7 +37,7 @@ room_packages() {
   local pictures='libpng-dev libtiff-dev libjpeg-dev'
   local decoder='libtomlplusplus-dev libopencv-core-dev libopencv-imgproc-dev'
   case $1 in
-    core/text | core/cloud | core/geometry) echo ;;
+    core/text | core/cloud | core/mesh | core/geometry) echo ;;
     core/code) echo libtomlplusplus-dev ;;
     core/calibration_file) echo libyaml-dev libopencv-core-dev ;;
     core/exposure) echo "$pictures" ;;

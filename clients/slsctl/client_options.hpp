@@ -22,7 +22,7 @@ struct ClientOptions {
   std::filesystem::path socket = client::default_socket();
   bool json = false;
   std::filesystem::path output;   ///< scan: the cloud; metrics, bundle: the file; empty: none
-  std::string format;             ///< scan: the cloud's format, "ply", "pcd" or "tiff"; empty: from the file's name
+  std::string format;             ///< scan: the cloud's format, as of cloud_format(); empty: from the file's name
   std::string metrics_format;     ///< metrics: "openmetrics" or "prometheus"; empty: depends on the destination
   std::filesystem::path picture;  ///< scan: the frame with the decoded symbols; light: the frame with its light
   std::vector<std::filesystem::path> from;  ///< light: one or two frames to read; empty: from the service
@@ -32,6 +32,7 @@ struct ClientOptions {
   std::filesystem::path shown;              ///< project: a picture's name, or a file
   std::string density;                      ///< scan, watch: "symbols" or "pixels"; empty: as configured
   bool normals = false;                     ///< scan: normals of pixels
+  bool mesh = false;                        ///< scan: triangles of pixels
   bool texture = false;                     ///< scan: intensities from a frame in white light
   bool ambient = false;                     ///< scan: minus the room's light
   bool as_shown = false;                    ///< frame: keep the projector's picture

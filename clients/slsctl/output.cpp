@@ -10,6 +10,7 @@
 #include <iostream>
 #include <utility>
 
+#include "core/mesh/mesh_file.hpp"
 #include "core/printable.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/system/system_error.hpp"
@@ -19,8 +20,13 @@ namespace {
 
 using std::filesystem::path;
 
-constexpr std::array<std::pair<const char*, const char*>, 4> kCloudFormats{
-    {{".ply", "ply"}, {".pcd", "pcd"}, {".tiff", "tiff"}, {".tif", "tiff"}}};
+constexpr std::array<std::pair<const char*, const char*>, 7> kCloudFormats{{{".ply", "ply"},
+                                                                            {".pcd", "pcd"},
+                                                                            {".tiff", "tiff"},
+                                                                            {".tif", "tiff"},
+                                                                            {".stl", "stl"},
+                                                                            {".obj", "obj"},
+                                                                            {".glb", "glb"}}};
 
 /// Empty if the name has none of the known extensions.
 std::string format_named(const path& file) {
@@ -37,7 +43,9 @@ std::string wrong_cloud(const ClientOptions& options) {
   if (is_standard_output(options.output)) return {};
   const std::string named = format_named(options.output);
   if (named.empty() && options.format.empty())
-    return quoted(options.output) + ": write a cloud as .ply or .pcd, a depth map as .tiff, or add --format";
+    return quoted(options.output) +
+           ": write a cloud as .ply or .pcd, a depth map as .tiff, a mesh as .stl, .obj or .glb, or add "
+           "--format";
   if (!named.empty() && !options.format.empty() && named != options.format)
     return quoted(options.output) + " does not match --format " + options.format;
   return {};
@@ -48,6 +56,15 @@ std::string wrong_name(const path& file, const std::string& extension, const std
   const std::string given = lower_extension(file);
   if (file.empty() || given.empty() || given == extension) return {};
   return quoted(file) + ": " + what + " is written as " + extension + " only";
+}
+
+std::string wrong_mesh(const ClientOptions& options) {
+  if (!is_mesh(options)) return {};
+  if (options.output.empty()) return "--mesh needs a file to write: .ply, .stl, .obj or .glb";
+  if (!mesh_format(cloud_format(options))) return "a mesh is written as .ply, .stl, .obj or .glb";
+  if (options.density == "symbols") return "a mesh needs --density pixels: symbols are too far apart to tell edges";
+  if (options.normals) return "a mesh has the normals of its triangles: leave out --normals";
+  return {};
 }
 
 std::string wrong_depth_map(const ClientOptions& options) {
@@ -83,6 +100,11 @@ std::string cloud_format(const ClientOptions& options) {
   return options.output.empty() || is_standard_output(options.output) ? "ply" : format_named(options.output);
 }
 
+bool is_mesh(const ClientOptions& options) {
+  const std::string format = cloud_format(options);
+  return options.mesh || (format != "ply" && mesh_format(format));
+}
+
 std::string wrong_outputs(const ClientOptions& options, const std::string& command) {
   const auto files = outputs_of(options);
   const auto on_standard_output = std::ranges::count_if(files, is_standard_output);
@@ -91,6 +113,7 @@ std::string wrong_outputs(const ClientOptions& options, const std::string& comma
   if (on_standard_output > 1) return "standard output (-) takes one file only";
   std::string wrong;
   if (command == "scan" && !options.output.empty()) wrong = wrong_cloud(options);
+  if (command == "scan" && wrong.empty()) wrong = wrong_mesh(options);
   if (command == "scan" && wrong.empty()) wrong = wrong_depth_map(options);
   if (command == "bundle") wrong = wrong_name(options.output, ".tar", "a bundle");
   for (const path& picture : {options.picture, options.cloud_picture, options.image})

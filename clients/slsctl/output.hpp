@@ -24,9 +24,12 @@ namespace slsd {
 /// The stream for messages: standard output, or standard error if the result itself goes to standard output.
 [[nodiscard]] std::ostream& words(const ClientOptions& options);
 
-/// The format of a scan's cloud from --format or the file's extension: "ply", "pcd" or "tiff"; "ply" for standard
-/// output, and without a file. Empty: an unknown extension.
+/// The format of a scan's cloud from --format or the file's extension: "ply", "pcd", "tiff", "stl", "obj" or "glb";
+/// "ply" for standard output, and without a file. Empty: an unknown extension.
 [[nodiscard]] std::string cloud_format(const ClientOptions& options);
+
+/// Tells whether the scan's points are joined to triangles: by --mesh, or because the format knows nothing else.
+[[nodiscard]] bool is_mesh(const ClientOptions& options);
 
 /// The error in the names of the output files, found before any work; empty: none.
 [[nodiscard]] std::string wrong_outputs(const ClientOptions& options, const std::string& command);

@@ -9,6 +9,9 @@
 #include "core/cloud/dense_file.hpp"
 #include "core/cloud/pcd.hpp"
 #include "core/cloud/ply.hpp"
+#include "core/dense/dense_map.hpp"
+#include "core/mesh/mesh_file.hpp"
+#include "core/mesh/mesh_grid.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "picture/render_cloud.hpp"
@@ -48,16 +51,32 @@ tl::expected<void, Failure> write_cloud_picture(const path& file, const Result<C
   return write_output(file, *png);
 }
 
-// slsctl draws a cloud's picture itself: of symbols from a PLY, of pixels from a PCD. It then makes the file from the
-// same data.
+// slsctl itself draws a cloud's picture, of symbols from a PLY, of pixels from a PCD, and joins pixels to a mesh. It
+// then makes the file from the same data.
 std::string asked_format(const ClientOptions& options, bool dense) {
+  if (is_mesh(options)) return "pcd";
   if (options.cloud_picture.empty()) return cloud_format(options);
   return dense ? "pcd" : "ply";
+}
+
+Result<std::string> mesh_of(const ClientOptions& options, const json& result, std::string_view bytes) {
+  const auto pixels = pixels_of(result, bytes, options.normals);
+  if (!pixels) return tl::unexpected(pixels.error());
+  auto mesh = write_mesh(mesh_grid(pixels->grid(), kDepthJump), *mesh_format(cloud_format(options)),
+                         "scan " + result.value("scan", "") + ", " + result.value("time", ""));
+  if (!mesh && mesh.error().code == ErrorCode::kNotFound)
+    mesh.error().message += ": slsctl scan --picture FILE.png --why shows what was rejected";
+  return mesh;
 }
 
 tl::expected<void, Failure> write_cloud(const ClientOptions& options, const json& result, std::string_view bytes,
                                         bool dense) {
   if (options.output.empty()) return {};
+  if (is_mesh(options)) {
+    const auto mesh = mesh_of(options, result, bytes);
+    if (!mesh) return tl::unexpected(Failure{kRequestFailed, rpc_error(mesh.error())});
+    return write_output(options.output, *mesh);
+  }
   if (asked_format(options, dense) == cloud_format(options)) return write_output(options.output, bytes);
   if (dense) {
     const auto pixels = pixels_of(result, bytes, options.normals);
@@ -90,7 +109,7 @@ tl::expected<void, Failure> write_files(const ClientOptions& options, const Answ
 /// The density to request; empty: the service's configured one. The format for the picture depends on it.
 tl::expected<std::string, Failure> asked_density(const ClientOptions& options, Connection& connection) {
   if (!options.density.empty()) return options.density;
-  if (options.normals || cloud_format(options) == "tiff") return "pixels";
+  if (options.normals || is_mesh(options) || cloud_format(options) == "tiff") return "pixels";
   if (options.cloud_picture.empty()) return "";
   const auto settings = ask(connection, "settings", json::object());
   if (!settings) return tl::unexpected(settings.error());

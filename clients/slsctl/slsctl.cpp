@@ -57,15 +57,18 @@ void add_scan(CLI::App& app, ClientOptions& options) {
   CLI::App* scan = add_command(app, kMeasure, "scan", "take one scan and write its point cloud",
                                "  slsctl scan cloud.ply\n"
                                "  slsctl scan --density pixels depth.tiff\n"
+                               "  slsctl scan part.stl\n"
                                "  slsctl scan --format pcd -o - | my-program\n");
-  CLI::Option* output = scan->add_option("-o,--output,CLOUD", options.output,
-                                         "the file to write: .ply, .pcd or .tiff; - is standard output")
-                            ->type_name("FILE");
+  CLI::Option* output =
+      scan->add_option("-o,--output,CLOUD", options.output,
+                       "the file to write: .ply, .pcd or .tiff, or a mesh as .stl, .obj or .glb; - is standard output")
+          ->type_name("FILE");
   scan->add_option("--format", options.format, "the format, if the file's name does not show it")
-      ->check(one_of({"ply", "pcd", "tiff"}))
+      ->check(one_of({"ply", "pcd", "tiff", "stl", "obj", "glb"}))
       ->needs(output);
   add_density(scan, options);
   scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
+  scan->add_flag("--mesh", options.mesh, "join the points (of pixels) to triangles; .stl, .obj and .glb always do");
   scan->add_flag("--texture", options.texture, "also take a frame in white light, for the points' intensities");
   scan->add_flag("--ambient", options.ambient,
                  "also take a frame without the projector's light, and subtract the room's light");

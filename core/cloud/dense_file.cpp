@@ -15,7 +15,7 @@ namespace {
 constexpr std::string_view kUnitsLine = "units mm\n",
                            kFrameLine = "coordinate_frame rig: the first camera's, x right, y down, z forward\n",
                            kDataBegins = "\nDATA binary\n";
-constexpr std::size_t kDepthAt = 8, kIntensityAt = 16, kCameraAt = 20;  // in a PCD's record
+constexpr std::size_t kDepthAt = 8, kSigmaAt = 12, kIntensityAt = 16, kCameraAt = 20;  // in a PCD's record
 
 float float_at(std::string_view record, std::size_t at) {
   float value;
@@ -108,6 +108,21 @@ std::string DensePcd::to_ply(const DenseFacts& facts) const {
     ++count;
   }
   return dense_ply_header(all, count) + points;
+}
+
+PointGrid DensePcd::grid() const {
+  PointGrid grid;
+  grid.width = width_, grid.height = height_;
+  grid.points_mm.resize(pixels()), grid.sigma_mm.resize(pixels());
+  grid.intensity.resize(pixels()), grid.camera.resize(pixels());
+  for (std::size_t pixel = 0; pixel < pixels(); ++pixel) {
+    const std::string_view from = record(pixel);
+    std::memcpy(grid.points_mm[pixel].data(), from.data(), 3 * sizeof(float));
+    grid.sigma_mm[pixel] = float_at(from, kSigmaAt);
+    grid.intensity[pixel] = intensity_of(from);
+    grid.camera[pixel] = static_cast<std::uint8_t>(from[kCameraAt]);
+  }
+  return grid;
 }
 
 Cloud DensePcd::lattice(int step) const {

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "core/cloud/cloud.hpp"
+#include "core/cloud/point_grid.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
@@ -43,6 +44,8 @@ class DensePcd {
 
   /// Converts to a PLY, without the pixels that are not measured. Counts the cameras itself.
   [[nodiscard]] std::string to_ply(const DenseFacts& facts) const;
+  /// All pixels, measured or not.
+  [[nodiscard]] PointGrid grid() const;
   /// Every step-th pixel of every step-th row as a point whose column and row are its place in that lattice, as far as
   /// it lies in front of the first camera.
   [[nodiscard]] Cloud lattice(int step) const;

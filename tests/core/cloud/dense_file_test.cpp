@@ -81,6 +81,23 @@ TEST(DenseFile, BecomesThePlyOfTheSamePoints) {
   }
 }
 
+TEST(DenseFile, HasAGridOfAllPixels) {
+  for (const bool normals : {false, true}) {
+    const std::string bytes = pcd(normals);
+    const PointGrid grid = DensePcd::open(bytes, kHeight, normals)->grid();
+    EXPECT_EQ(grid.width, kWidth);
+    EXPECT_EQ(grid.height, kHeight);
+    ASSERT_EQ(grid.points_mm.size(), 12u);
+    EXPECT_EQ(grid.points_mm[grid.index(2, 2)], Eigen::Vector3f(94, -47, 940));
+    EXPECT_EQ(grid.sigma_mm[8], 0.25F);
+    EXPECT_EQ(grid.intensity[8], 108);
+    EXPECT_EQ(grid.camera[8], 1);
+    EXPECT_TRUE(std::isnan(grid.points_mm[1].z()));
+    EXPECT_EQ(grid.intensity[1], 0);
+    EXPECT_EQ(grid.points_mm[11].z(), -960);
+  }
+}
+
 TEST(DenseFile, HasALatticeOfEverySecondPixel) {
   const std::string bytes = pcd(true);
   const Cloud cloud = DensePcd::open(bytes, kHeight, true)->lattice(2);
