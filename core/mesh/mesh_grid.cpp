@@ -10,7 +10,7 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;  // of pixels
 
-/// How many sigma must lie within a jump.
+/// Number of sigmas that must lie within a jump.
 constexpr float kSigmas = 3;
 
 class Joiner {
