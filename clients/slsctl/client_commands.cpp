@@ -8,8 +8,8 @@
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/progress.hpp"
 #include "clients/slsctl/report.hpp"
+#include "core/base64.hpp"
 #include "core/printable.hpp"
-#include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"
 

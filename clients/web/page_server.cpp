@@ -11,9 +11,9 @@
 
 #include "clients/connection/connection.hpp"
 #include "clients/slsctl/client_commands.hpp"
+#include "core/base64.hpp"
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
-#include "daemon/rpc/base64.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"
 

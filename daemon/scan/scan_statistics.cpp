@@ -2,18 +2,7 @@
 // Copyright the slsd authors
 #include "daemon/scan/scan_statistics.hpp"
 
-#include <algorithm>
-
 namespace slsd {
-
-void Duration::add(std::chrono::nanoseconds time) {
-  const double seconds = std::chrono::duration<double>(time).count();
-  ++buckets[static_cast<std::size_t>(std::ranges::lower_bound(kDurationBounds, seconds) - kDurationBounds.begin())];
-  last = time;
-  total += time;
-  longest = std::max(longest, time);
-  ++count;
-}
 
 void ScanStatistics::note_latency(std::chrono::nanoseconds time) {
   const std::lock_guard lock(mutex_);

@@ -7,7 +7,7 @@
 
 #include <asio/post.hpp>
 
-#include "daemon/rpc/base64.hpp"
+#include "core/base64.hpp"
 #include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/methods/answer.hpp"
 #include "daemon/server/methods/methods_by_kind.hpp"

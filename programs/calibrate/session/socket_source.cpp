@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/rpc/base64.hpp"
+#include "core/base64.hpp"
 #include "daemon/rpc/request.hpp"
 #include "drivers/files/encode_png.hpp"
 

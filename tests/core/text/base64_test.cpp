@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/rpc/base64.hpp"
+#include "core/base64.hpp"
 
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
