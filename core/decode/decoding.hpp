@@ -45,6 +45,8 @@ struct RegionSeen {
   float margin_nats = 0;                           ///< margin of its cell over any other, up to the required margin
 };
 
+using RegionCounts = std::array<std::uint32_t, kRegionStatusCount>;
+
 /// Results of one frame: its points, and the status of every region.
 struct Decoding {
   std::vector<CloudPoint> points;
@@ -52,8 +54,8 @@ struct Decoding {
   /// Symbols whose cells are certain but lie off their epipolar lines. The rig has lost its calibration, or another
   /// projector lights them.
   std::vector<SymbolMatch> off_line;
-  std::array<std::uint32_t, kRegionStatusCount> counts{};  ///< regions by status
-  RuleCounts rules{};                                      ///< regions by rule, and regions that each guard rejected
+  RegionCounts counts{};  ///< regions by status
+  RuleCounts rules{};     ///< regions by rule, and regions that each guard rejected
 
   [[nodiscard]] std::uint32_t count(RegionStatus status) const { return counts[static_cast<std::size_t>(status)]; }
 };

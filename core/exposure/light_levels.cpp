@@ -90,4 +90,10 @@ double full_level(std::string_view format, const GreyView& frame) {
   return bits == 10 || bits == 12 || bits == 14 ? std::max<double>((1 << bits) - 1, guessed) : guessed;
 }
 
+double full_level(std::string_view format, std::span<const GreyView> frames) {
+  double full = 0;
+  for (const GreyView& frame : frames) full = std::max(full, full_level(format, frame));
+  return full;
+}
+
 }  // namespace slsd

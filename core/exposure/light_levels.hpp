@@ -73,4 +73,8 @@ class HeldFullLevel {
 /// @thread reentrant
 [[nodiscard]] double full_level(std::string_view format, const GreyView& frame);
 
+/// The same for several frames of one camera: a guess from a dark frame alone would be too low. 0 without frames.
+/// @thread reentrant
+[[nodiscard]] double full_level(std::string_view format, std::span<const GreyView> frames);
+
 }  // namespace slsd

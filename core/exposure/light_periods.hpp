@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace slsd {
@@ -33,6 +34,12 @@ struct ExposureFit {
 /// @param exposure_us  above 0
 /// @thread reentrant
 [[nodiscard]] ExposureFit fit_exposure(double exposure_us, const LightPeriods& periods);
+
+/// Says which lights the exposure does not suit, and the nearest that suit: "is not a whole multiple of a projector
+/// frame (16667 us at 60 Hz), so frames differ in brightness: set 16667 or 33333". Empty if it suits.
+/// @param exposure_us  above 0
+/// @thread reentrant
+[[nodiscard]] std::string exposure_misfit(double exposure_us, const LightPeriods& periods);
 
 /// All exposures that fit both lights, shortest first, in microseconds; empty if both are steady and any exposure fits.
 /// @param longest_us  up to 10 s

@@ -10,6 +10,7 @@
 #include <limits>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -247,6 +248,22 @@ Result<MergedExposures> merge_exposures(const GreyView& shorter, const GreyView&
   return std::visit(
       [&]<class T>(const ImageView<T>& view) { return merge(view, std::get<ImageView<T>>(longer), full, ratio); },
       shorter);
+}
+
+MergedPictures merge_pictures(std::span<const ExposurePair> pairs, double full, double ratio) {
+  MergedPictures merged;
+  for (const auto& [shorter, longer] : pairs) {
+    auto both = merge_exposures(shorter, longer, full, ratio);
+    if (!both) {
+      merged.problem = both.error().message;
+      break;
+    }
+    merged.images.push_back(std::move(both->image));
+  }
+  if (merged.problem.empty()) return merged;
+  merged.images.clear();
+  for (const ExposurePair& pair : pairs) merged.images.push_back(as_merged(pair.shorter, full));
+  return merged;
 }
 
 bool needs_second_exposure(const LightLevels& levels) {

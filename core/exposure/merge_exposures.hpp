@@ -2,6 +2,10 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <span>
+#include <string>
+#include <vector>
+
 #include "core/exposure/light_levels.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
@@ -34,6 +38,24 @@ struct MergedExposures {
 /// @thread reentrant
 [[nodiscard]] Result<MergedExposures> merge_exposures(const GreyView& shorter, const GreyView& longer, double full,
                                                       double ratio);
+
+/// Two exposures of one picture: of the pattern, of white or of black.
+struct ExposurePair {
+  GreyView shorter;
+  GreyView longer;
+};
+
+/// The pictures of one camera, each as one frame with kMergedFull as the level of a saturated pixel.
+struct MergedPictures {
+  std::vector<Grey16> images;  ///< one for each pair
+  std::string problem;         ///< why they are the shorter exposures alone; empty: all pairs are merged
+};
+
+/// Merges all pictures of a camera, or none: their levels must be comparable.
+/// @param pairs  of one scene
+/// @param full, ratio  as for merge_exposures()
+/// @thread reentrant
+[[nodiscard]] MergedPictures merge_pictures(std::span<const ExposurePair> pairs, double full, double ratio);
 
 /// Tells whether a second exposure would help: symbols are clipped in more than a twentieth of the pattern, and the
 /// faintest are darker than an eighth of full level, so that no single exposure suits both.

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "daemon/scan/scan_setup.hpp"
-#include "core/calibration_file/calibration_file.hpp"
 
 #include <algorithm>
 #include <future>
-#include <limits>
 
-#include <fmt/format.h>
-
-#include "core/decode/grid/lattice_frame.hpp"
-#include "core/decode/symbols/separability.hpp"
+#include "core/calibration_file/calibration_file.hpp"
+#include "core/exposure/light_levels.hpp"
 #include "core/image_size.hpp"
 #include "core/printable.hpp"
 #include "drivers/files/file.hpp"
@@ -109,43 +105,6 @@ Result<Pattern> configured_pattern(const Configuration& configuration) {
       check_size(options.projector_width_px, options.projector_height_px, configuration.projector, "this pattern");
   if (!fits) return tl::unexpected(place_at(fits.error(), file.string()).error());
   return pattern;
-}
-
-double pattern_scale(const std::optional<Calibration>& calibration, const DecodeOptions& options) {
-  if (!calibration) return LookOptions{}.camera_px_per_projector_px;
-  double smallest = std::numeric_limits<double>::max();
-  for (const CalibratedCamera& camera : calibration->cameras) {
-    const ExpectedFrames frames(camera, calibration->projector, options.middle_depth_mm());
-    smallest = std::min<double>(smallest, frames.in_the_middle().scale);
-  }
-  return smallest;
-}
-
-std::vector<std::string> symbol_warnings(const PatternOptions& pattern, double scale) {
-  LookOptions look;
-  look.camera_px_per_projector_px = scale;
-  look.symbol_size_px = pattern.symbol_size_px;
-  look.spacing_px = pattern.spacing_px;
-  const auto separability = assess_separability(pattern.symbols, look);
-  if (!separability) return {to_string(separability.error())};
-  return separability_warnings(*separability, pattern.symbol_size_px);
-}
-
-std::vector<std::string> calibration_error_warnings(const Calibration& calibration) {
-  constexpr double kLargePx = 0.3;
-  const CalibrationReport& report = calibration.report;
-  std::vector<std::string> warnings;
-  const auto look = [&](const std::optional<double>& error_px, const char* what) {
-    if (!error_px || !(*error_px > kLargePx)) return;
-    warnings.push_back(
-        fmt::format("the calibration's {} is {:.2f} px, too much for dense clouds: all their points are off together; "
-                    "calibrate again",
-                    what, *error_px));
-  };
-  look(report.reprojection_error_camera_px, "reprojection error in the camera");
-  look(report.reprojection_error_projector_px, "reprojection error in the projector");
-  look(report.epipolar_error_px, "error across the epipolar lines");
-  return warnings;
 }
 
 Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration) {
@@ -267,6 +226,11 @@ Result<> ScanSetup::check_camera(const std::string& name) const {
 std::size_t ScanSetup::camera_index(const std::string& name) const {
   if (name.empty()) return 0;
   return static_cast<std::size_t>(std::ranges::find(camera_names, name) - camera_names.begin());
+}
+
+double ScanSetup::full_level_of(std::size_t camera, std::span<const GreyView> frames) const {
+  const std::string format = camera < camera_formats.size() ? camera_formats[camera] : "";
+  return full_levels->raise(camera, full_level(format, frames));
 }
 
 ScanFiles ScanSetup::files() const {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,14 +29,6 @@ namespace slsd {
 /// @errors of make_pattern(), read_file() and read_pattern(); kMismatch: not in the projector's size
 [[nodiscard]] Result<Pattern> configured_pattern(const Configuration& configuration);
 
-/// Camera pixels for one projector pixel, in the calibrated camera that sees the pattern smallest. Without a
-/// calibration, of the paper's rig.
-[[nodiscard]] double pattern_scale(const std::optional<Calibration>& calibration, const DecodeOptions& options);
-
-/// Warnings about the pattern's choice of symbols at this scale, one sentence each. Empty if there is no risk. Computes
-/// for a fraction of a second.
-[[nodiscard]] std::vector<std::string> symbol_warnings(const PatternOptions& pattern, double scale);
-
 /// The calibration that the configuration names; empty if it names none.
 /// @errors of read_file() and read_calibration(); kMismatch: for another projector size, or without one of the cameras
 [[nodiscard]] Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration);
@@ -45,10 +38,6 @@ struct ScanFiles {
   std::string pattern;      ///< a pattern file
   std::string calibration;  ///< a calibration file; empty: none
 };
-
-/// Warnings about the effect of the calibration's reported error on dense clouds. Each says what to do. Empty if the
-/// error is unknown, or small beside the clouds' own error.
-[[nodiscard]] std::vector<std::string> calibration_error_warnings(const Calibration& calibration);
 
 /// The saturation levels that the cameras' frames have shown so far. If no format gives the bit depth, a faint frame
 /// after a bright one must not seem to have fewer bits.
@@ -123,6 +112,9 @@ struct ScanSetup {
   /// @param name  of a camera; empty: the first
   /// @return the camera's index; the number of cameras if none has this name
   [[nodiscard]] std::size_t camera_index(const std::string& name) const;
+
+  /// The level of a saturated pixel of a camera, from its format, these frames and all before. @thread thread-safe
+  [[nodiscard]] double full_level_of(std::size_t camera, std::span<const GreyView> frames) const;
 
   [[nodiscard]] ScanFiles files() const;
 };

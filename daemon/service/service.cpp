@@ -10,6 +10,8 @@
 #include <spdlog/spdlog.h>
 #include <asio/post.hpp>
 
+#include "core/calibrate/doubt/calibration_doubts.hpp"
+#include "core/decode/symbols/symbol_warnings.hpp"
 #include "daemon/bundle/bundle.hpp"
 #include "daemon/configuration/exposure_warnings.hpp"
 #include "daemon/configuration/settings_over.hpp"

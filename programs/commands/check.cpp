@@ -10,6 +10,9 @@
 #include <fmt/format.h>
 
 #include "clients/connection/connection.hpp"
+#include "core/calibrate/doubt/calibration_doubts.hpp"
+#include "core/calibrate/doubt/frame_doubt.hpp"
+#include "core/decode/symbols/symbol_warnings.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/dense/dense_outlook.hpp"
 #include "core/exposure/exposure_advice.hpp"

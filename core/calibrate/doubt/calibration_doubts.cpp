@@ -198,6 +198,23 @@ std::vector<std::string> calibration_doubts(const Calibration& calibration, cons
   return doubts;
 }
 
+std::vector<std::string> calibration_error_warnings(const Calibration& calibration) {
+  constexpr double kLargePx = 0.3;
+  const CalibrationReport& report = calibration.report;
+  std::vector<std::string> warnings;
+  const auto look = [&](const std::optional<double>& error_px, const char* what) {
+    if (!error_px || !(*error_px > kLargePx)) return;
+    warnings.push_back(
+        fmt::format("the calibration's {} is {:.2f} px, too much for dense clouds: all their points are off together; "
+                    "calibrate again",
+                    what, *error_px));
+  };
+  look(report.reprojection_error_camera_px, "reprojection error in the camera");
+  look(report.reprojection_error_projector_px, "reprojection error in the projector");
+  look(report.epipolar_error_px, "error across the epipolar lines");
+  return warnings;
+}
+
 std::string symbol_doubt(std::span<const Match> matches, const CameraRig& rig, const DepthRange& range,
                          double gate_px) {
   constexpr double kMost = 0.5;

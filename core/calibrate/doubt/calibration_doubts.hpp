@@ -17,6 +17,11 @@ namespace slsd {
 /// @thread reentrant
 [[nodiscard]] std::vector<std::string> calibration_doubts(const Calibration& calibration, const DepthRange& range);
 
+/// Warnings about the effect of the calibration's reported error on dense clouds. Each says what to do. Empty if the
+/// error is unknown, or small beside the clouds' own error.
+/// @thread reentrant
+[[nodiscard]] std::vector<std::string> calibration_error_warnings(const Calibration& calibration);
+
 /// Compares a camera's calibration with symbols that were read without the calibration.
 /// @param matches  at least kSymbolsForDoubt; a few of them may be wrong
 /// @param gate_px  largest accepted distance of symbols from their epipolar lines

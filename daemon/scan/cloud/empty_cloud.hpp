@@ -18,14 +18,6 @@
 
 namespace slsd {
 
-/// Reads the pattern without a calibration and compares the symbols with the calibration. Takes about a second.
-/// @param camera  index in the calibration
-/// @param read    out: number of symbols read
-/// @return a sentence about the calibration; empty if it explains the symbols, or if too few were read
-/// @thread reentrant
-[[nodiscard]] std::string doubt_by_frame(const GreyView& frame, const Pattern& pattern, const Calibration& calibration,
-                                         std::size_t camera, const DepthRange& range, std::size_t& read);
-
 /// The pattern, calibration and working range of a scan, which explain an empty cloud. Borrows all three.
 struct ScanBasis {
   const Pattern& pattern;

@@ -6,10 +6,10 @@
 #include <span>
 #include <utility>
 
+#include "core/calibrate/watch/stray_symbols.hpp"
 #include "core/cloud/shade_points.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/exposure/frame_noise.hpp"
-#include "core/exposure/light_levels.hpp"
 #include "core/exposure/merge_exposures.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/utc_text.hpp"
@@ -19,8 +19,6 @@ namespace slsd {
 namespace {
 
 using std::chrono::steady_clock;
-
-constexpr std::size_t kStraysMin = 24;
 
 std::string utc_time(MonotonicTime time) {
   return utc_text_ms(std::chrono::system_clock::now() - (steady_clock::now() - time));
@@ -68,15 +66,14 @@ Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding co
   return kept;
 }
 
-// The saturation level of a camera, for all its frames: a guess from a dark frame alone would be too low.
+// The saturation level of a camera, for all its frames.
 double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera) {
   if (set.is_merged(camera)) return kMergedFull;
-  const std::string format = camera < setup.camera_formats.size() ? setup.camera_formats[camera] : "";
-  double full = 0;
+  std::vector<GreyView> all;
   for (const auto* frames : {&set.frames, &set.white, &set.dark}) {
-    if (!frames->empty()) full = std::max(full, full_level(format, (*frames)[camera].image()));
+    if (!frames->empty()) all.push_back((*frames)[camera].image());
   }
-  return setup.full_levels->raise(camera, full);
+  return setup.full_level_of(camera, all);
 }
 
 SceneLight light_of(const FrameSet& set, std::size_t camera, double full) {
@@ -128,19 +125,6 @@ std::string why_empty(const FrameSet& set, const ScanSetup& setup, std::size_t l
 }
 
 }  // namespace
-
-std::vector<CloudPoint> stray_symbols(const Decoding& decoding, std::uint8_t camera) {
-  if (decoding.off_line.size() < kStraysMin || decoding.off_line.size() < decoding.points.size()) return {};
-  std::vector<CloudPoint> strays;
-  for (const SymbolMatch& match : decoding.off_line) {
-    CloudPoint& stray = strays.emplace_back();
-    const Eigen::Vector2f seen = match.camera_px.cast<float>(), lit = match.projector_px.cast<float>();
-    stray.camera_u = seen.x(), stray.camera_v = seen.y();
-    stray.projector_u = lit.x(), stray.projector_v = lit.y();
-    stray.camera = camera;
-  }
-  return strays;
-}
 
 Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_t lane, const ScanRequest& request,
                                const std::string& scan_id) {

@@ -23,11 +23,4 @@ namespace slsd {
 [[nodiscard]] Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_t lane,
                                              const ScanRequest& request, const std::string& scan_id);
 
-/// Finds a frame's symbols off their epipolar lines, if they outnumber its points. That happens when the rig was
-/// knocked out of the decoder's tolerance. Only their pixels are known; no cloud contains them.
-/// @param camera  index in the calibration
-/// @return        empty if the frame gave points, or does not show the pattern
-/// @thread reentrant
-[[nodiscard]] std::vector<CloudPoint> stray_symbols(const Decoding& decoding, std::uint8_t camera);
-
 }  // namespace slsd

@@ -48,8 +48,6 @@ struct RegionReason {
   std::optional<DecodeRule> guard;  ///< the last guard that kept the region from being restored
 };
 
-using RegionCounts = std::array<std::uint32_t, kRegionStatusCount>;
-
 /// The failed tries before a scan's last one: their frames were lost, torn or late.
 struct LostTries {
   std::uint64_t count = 0;

@@ -223,5 +223,18 @@ TEST(SymbolDoubt, SaysNothingOfAFewSymbols) {
   EXPECT_EQ(doubt_of(rig, matches), "");
 }
 
+TEST(CalibrationErrorWarnings, NameEachErrorAboveThreeTenthsOfAPixel) {
+  Calibration rig = paper_rig();
+  EXPECT_THAT(calibration_error_warnings(rig), IsEmpty());
+  rig.report.reprojection_error_camera_px = 0.3;
+  EXPECT_THAT(calibration_error_warnings(rig), IsEmpty());
+  rig.report.reprojection_error_camera_px = 0.31;
+  rig.report.reprojection_error_projector_px = 0.4;
+  rig.report.epipolar_error_px = 0.5;
+  EXPECT_THAT(calibration_error_warnings(rig),
+              ElementsAre(HasSubstr("in the camera is 0.31 px"), HasSubstr("in the projector is 0.40 px"),
+                          HasSubstr("across the epipolar lines is 0.50 px")));
+}
+
 }  // namespace
 }  // namespace slsd

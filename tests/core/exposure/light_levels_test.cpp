@@ -119,5 +119,13 @@ TEST(FullLevel, IsNotBelowAPixel) {
   EXPECT_EQ(full_level("Y10", Grey16(4, 4, 64 * 900).view()), 65535);
 }
 
+TEST(FullLevel, IsTheHighestOfSeveralFrames) {
+  const Grey16 bright(4, 4, 3000), dark(4, 4, 20);
+  const std::vector<GreyView> frames{bright.view(), dark.view()};
+  EXPECT_EQ(full_level("", frames), 4095);
+  EXPECT_EQ(full_level("Mono14", frames), 16383);
+  EXPECT_EQ(full_level("", std::vector<GreyView>{}), 0);
+}
+
 }  // namespace
 }  // namespace slsd

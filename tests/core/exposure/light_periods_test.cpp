@@ -87,5 +87,27 @@ TEST(FitExposure, WhatItNamesFits) {
   }));
 }
 
+TEST(ExposureMisfit, NamesThePeriodAndTheNearestExposures) {
+  EXPECT_EQ(exposure_misfit(20000, kDlp),
+            "is not a whole multiple of a projector frame (16667 us at 60 Hz), so frames differ in brightness: set "
+            "16667 or 33333");
+  EXPECT_EQ(exposure_misfit(16667, kDlpAnd50Hz),
+            "is not a whole multiple of half a lamp period (10000 us at 50 Hz), so frames differ in brightness: set "
+            "50000");
+  EXPECT_EQ(exposure_misfit(12000, kDlpAnd50Hz),
+            "is not a whole multiple of a projector frame (16667 us at 60 Hz), nor of half a lamp period (10000 us at "
+            "50 Hz), so frames differ in brightness: set 50000");
+}
+
+TEST(ExposureMisfit, NamesTheOnlyExposureThatIsNear) {
+  EXPECT_THAT(exposure_misfit(999'000, kDlp), ::testing::EndsWith(": set 983333 or 1000000"));
+  EXPECT_THAT(exposure_misfit(1'010'500, kDlp), ::testing::EndsWith(": set 1000000"));
+}
+
+TEST(ExposureMisfit, IsEmptyIfTheExposureSuits) {
+  EXPECT_EQ(exposure_misfit(16700, kDlp), "");
+  EXPECT_EQ(exposure_misfit(1234, kSteady), "");
+}
+
 }  // namespace
 }  // namespace slsd

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -231,6 +232,36 @@ TEST(MergeExposures, RefusesWhatDoesNotBelongTogether) {
   EXPECT_EQ(merge_exposures(frame.view(), frame.view(), 0, 4).error().code, ErrorCode::kInvalidArgument);
   EXPECT_TRUE(merge_exposures(Grey8().view(), Grey8().view(), 255, 4));
   EXPECT_TRUE(merge_exposures(Grey8(3, 2, 5).view(), Grey8(3, 2, 20).view(), 255, 4));
+}
+
+/// The shorter and the longer exposure of one picture.
+struct TwoFrames {
+  Grey8 shorter, longer;
+  [[nodiscard]] ExposurePair pair() const { return {shorter.view(), longer.view()}; }
+};
+
+TwoFrames two_frames(double ratio, unsigned seed) {
+  return {exposed<std::uint8_t>({}, 1, seed), exposed<std::uint8_t>({}, ratio, seed + 1)};
+}
+
+TEST(MergePictures, MergesEachPair) {
+  const TwoFrames pattern = two_frames(4, 1), white = two_frames(4, 3);
+  const MergedPictures merged = merge_pictures(std::vector{pattern.pair(), white.pair()}, 255, 4);
+  EXPECT_EQ(merged.problem, "");
+  ASSERT_EQ(merged.images.size(), 2U);
+  EXPECT_EQ(merged.images[0], merge_exposures(pattern.shorter.view(), pattern.longer.view(), 255, 4)->image);
+  EXPECT_EQ(merged.images[1], merge_exposures(white.shorter.view(), white.longer.view(), 255, 4)->image);
+}
+
+TEST(MergePictures, LeavesAllShorterOnesIfOnePairDoesNotMerge) {
+  const TwoFrames pattern = two_frames(4, 1), same = two_frames(1, 3);
+  for (const bool first : {false, true}) {
+    const std::vector pairs{first ? same.pair() : pattern.pair(), first ? pattern.pair() : same.pair()};
+    const MergedPictures merged = merge_pictures(pairs, 255, 4);
+    EXPECT_THAT(merged.problem, HasSubstr("times as bright"));
+    ASSERT_EQ(merged.images.size(), 2U);
+    for (std::size_t i = 0; i < 2; ++i) EXPECT_EQ(merged.images[i], as_merged(pairs[i].shorter, 255));
+  }
 }
 
 }  // namespace
