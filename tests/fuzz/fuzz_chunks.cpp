@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <span>
 
-#include "drivers/camera/aravis/frame_chunks.hpp"
+#include "drivers/camera/aravis/frames/frame_chunks.hpp"
 
 // The first byte is how many bytes the image has, the rest is the frame. What is taken holds the image and its tag.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -10,7 +10,7 @@
 
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/aravis_session.hpp"
-#include "drivers/camera/aravis/capture_events.hpp"
+#include "drivers/camera/aravis/frames/capture_events.hpp"
 
 namespace slsd {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
-#include "drivers/camera/aravis/frame_counts.hpp"
+#include "drivers/camera/aravis/frames/frame_counts.hpp"
 #include "drivers/camera/camera.hpp"
 
 namespace slsd {

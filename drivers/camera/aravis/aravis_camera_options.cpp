@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "drivers/camera/aravis/pixel_layout.hpp"
+#include "drivers/camera/aravis/frames/pixel_layout.hpp"
 
 namespace slsd {
 namespace {

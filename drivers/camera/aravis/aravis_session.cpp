@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
-#include "drivers/camera/aravis/capture_events.hpp"
-#include "drivers/camera/aravis/configure_device.hpp"
-#include "drivers/camera/aravis/configure_network.hpp"
+#include "drivers/camera/aravis/device/configure_device.hpp"
+#include "drivers/camera/aravis/frames/capture_events.hpp"
+#include "drivers/camera/aravis/gige/configure_network.hpp"
 
 namespace slsd {
 namespace {

@@ -11,17 +11,17 @@
 #include <vector>
 
 #include "core/result.hpp"
-#include "drivers/camera/aravis/action_group.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
-#include "drivers/camera/aravis/capture_events.hpp"
-#include "drivers/camera/aravis/configure_device.hpp"
-#include "drivers/camera/aravis/configure_network.hpp"
-#include "drivers/camera/aravis/device_control.hpp"
-#include "drivers/camera/aravis/fragment_watch.hpp"
-#include "drivers/camera/aravis/frame_capture.hpp"
-#include "drivers/camera/aravis/frame_receiver.hpp"
+#include "drivers/camera/aravis/device/configure_device.hpp"
+#include "drivers/camera/aravis/device/device_control.hpp"
+#include "drivers/camera/aravis/device/open_device.hpp"
+#include "drivers/camera/aravis/frames/capture_events.hpp"
+#include "drivers/camera/aravis/frames/frame_capture.hpp"
+#include "drivers/camera/aravis/frames/frame_receiver.hpp"
 #include "drivers/camera/aravis/g_object.hpp"
-#include "drivers/camera/aravis/open_device.hpp"
+#include "drivers/camera/aravis/gige/action_group.hpp"
+#include "drivers/camera/aravis/gige/configure_network.hpp"
+#include "drivers/camera/aravis/gige/fragment_watch.hpp"
 #include "drivers/camera/frame.hpp"
 
 namespace slsd {

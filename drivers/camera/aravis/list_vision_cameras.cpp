@@ -8,10 +8,10 @@
 #include <chrono>
 
 #include "core/printable.hpp"
-#include "drivers/camera/aravis/configure_network.hpp"
-#include "drivers/camera/aravis/gige_discovery.hpp"
-#include "drivers/camera/aravis/open_device.hpp"
-#include "drivers/camera/aravis/pixel_layout.hpp"
+#include "drivers/camera/aravis/device/open_device.hpp"
+#include "drivers/camera/aravis/frames/pixel_layout.hpp"
+#include "drivers/camera/aravis/gige/configure_network.hpp"
+#include "drivers/camera/aravis/gige/gige_discovery.hpp"
 #include "drivers/camera/listing/sysfs.hpp"
 
 namespace slsd {

@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include "drivers/camera/listing/list_cameras.hpp"
 
-#include "drivers/camera/aravis/configure_network.hpp"
+#include "drivers/camera/aravis/gige/configure_network.hpp"
 #include "drivers/camera/aravis/list_vision_cameras.hpp"
 #include "drivers/camera/v4l2/list_v4l2_cameras.hpp"
 

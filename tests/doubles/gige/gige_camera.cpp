@@ -11,8 +11,8 @@
 #include <array>
 #include <stdexcept>
 
-#include "tests/doubles/gige/compose_frame.hpp"
 #include "tests/doubles/gige/device_socket.hpp"
+#include "tests/doubles/gige/frames/compose_frame.hpp"
 
 namespace slsd::test {
 namespace {

@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "tests/doubles/gige/control_port.hpp"
+#include "tests/doubles/gige/frames/sensor.hpp"
 #include "tests/doubles/gige/gige_camera_options.hpp"
 #include "tests/doubles/gige/gige_faults.hpp"
 #include "tests/doubles/gige/register_file.hpp"
-#include "tests/doubles/gige/sensor.hpp"
 #include "tests/doubles/gige/stream_sender.hpp"
 #include "tests/doubles/gige/tick_clock.hpp"
 

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "tests/doubles/gige/counter_frame.hpp"
+#include "tests/doubles/gige/frames/counter_frame.hpp"
 
 namespace slsd::test {
 

@@ -16,9 +16,9 @@
 #include "drivers/camera/camera.hpp"
 #include "drivers/camera/faulty_camera.hpp"
 #include "drivers/camera/file_camera.hpp"
-#include "tests/drivers/camera/gige_backend.hpp"
+#include "tests/drivers/camera/aravis/gige_backend.hpp"
 #include "tests/drivers/camera/recording.hpp"
-#include "tests/drivers/camera/v4l2_backends.hpp"
+#include "tests/drivers/camera/v4l2/v4l2_backends.hpp"
 
 namespace slsd {
 namespace {

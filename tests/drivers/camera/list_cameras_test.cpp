@@ -15,8 +15,8 @@
 #include "drivers/camera/aravis/aravis_camera.hpp"
 #include "drivers/camera/v4l2/list_v4l2_cameras.hpp"
 #include "drivers/camera/v4l2/v4l2_device.hpp"
-#include "tests/drivers/camera/gige_backend.hpp"
-#include "tests/drivers/camera/v4l2_backends.hpp"
+#include "tests/drivers/camera/aravis/gige_backend.hpp"
+#include "tests/drivers/camera/v4l2/v4l2_backends.hpp"
 #include "tests/drivers/temporary_folder.hpp"
 
 namespace slsd {

@@ -11,7 +11,7 @@
 #include "daemon/scan/rig/rig.hpp"
 #include "tests/daemon/scan/clocked_camera.hpp"
 #include "tests/doubles/gige/gige_camera.hpp"
-#include "tests/drivers/camera/gige_backend.hpp"
+#include "tests/drivers/camera/aravis/gige_backend.hpp"
 
 namespace slsd {
 namespace {
