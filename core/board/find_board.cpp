@@ -7,10 +7,10 @@
 #include <string>
 
 #include "core/board/board_photo.hpp"
-#include "core/board/find_charuco.hpp"
-#include "core/board/find_chessboard.hpp"
-#include "core/board/find_circles.hpp"
 #include "core/board/find_plane.hpp"
+#include "core/board/grids/find_chessboard.hpp"
+#include "core/board/grids/find_circles.hpp"
+#include "core/board/markers/find_charuco.hpp"
 
 namespace slsd {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <string>
 
-#include "core/board/marker_edges.hpp"
-#include "core/board/markers_in_photo.hpp"
+#include "core/board/markers/marker_edges.hpp"
+#include "core/board/markers/markers_in_photo.hpp"
 #include "core/board/measured_points.hpp"
 
 namespace slsd {

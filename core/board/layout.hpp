@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "core/board/board.hpp"
-#include "core/board/find_markers.hpp"
+#include "core/board/markers/find_markers.hpp"
 #include "core/board/tie.hpp"
 #include "core/result.hpp"
 

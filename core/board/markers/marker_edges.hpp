@@ -5,7 +5,7 @@
 #include <array>
 #include <optional>
 
-#include "core/board/find_markers.hpp"
+#include "core/board/markers/find_markers.hpp"
 #include "core/board/measured_points.hpp"
 #include "core/image.hpp"
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/find_charuco.hpp"
+#include "core/board/markers/find_charuco.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 
-#include "core/board/corner_lattice.hpp"
+#include "core/board/grids/corner_lattice.hpp"
 #include "core/board/layout.hpp"
-#include "core/board/markers_in_photo.hpp"
+#include "core/board/markers/markers_in_photo.hpp"
 
 namespace slsd {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "core/board/board.hpp"
 #include "core/board/board_photo.hpp"
-#include "core/board/find_markers.hpp"
+#include "core/board/markers/find_markers.hpp"
 #include "core/result.hpp"
 
 namespace slsd {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/saddle.hpp"
+#include "core/board/grids/saddle.hpp"
 
 #include <algorithm>
 #include <cmath>

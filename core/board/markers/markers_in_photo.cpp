@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/markers_in_photo.hpp"
+#include "core/board/markers/markers_in_photo.hpp"
 
 #include <algorithm>
 #include <string>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/corner_lattice.hpp"
+#include "core/board/grids/corner_lattice.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <Eigen/LU>
 
-#include "core/board/saddle.hpp"
+#include "core/board/grids/saddle.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/marker_edges.hpp"
+#include "core/board/markers/marker_edges.hpp"
 
 #include <algorithm>
 #include <cmath>

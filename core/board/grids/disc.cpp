@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/disc.hpp"
+#include "core/board/grids/disc.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/find_markers.hpp"
+#include "core/board/markers/find_markers.hpp"
 
 #include <algorithm>
 #include <cmath>

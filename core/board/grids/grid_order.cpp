@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/grid_order.hpp"
+#include "core/board/grids/grid_order.hpp"
 
 #include <algorithm>
 

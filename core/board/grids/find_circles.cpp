@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/find_circles.hpp"
+#include "core/board/grids/find_circles.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/board/disc.hpp"
-#include "core/board/grid_order.hpp"
+#include "core/board/grids/disc.hpp"
+#include "core/board/grids/grid_order.hpp"
 #include "core/board/measured_points.hpp"
 
 namespace slsd {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/board/find_chessboard.hpp"
+#include "core/board/grids/find_chessboard.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +9,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "core/board/corner_lattice.hpp"
-#include "core/board/grid_order.hpp"
+#include "core/board/grids/corner_lattice.hpp"
+#include "core/board/grids/grid_order.hpp"
 
 namespace slsd {
 namespace {
