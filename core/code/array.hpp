@@ -37,7 +37,7 @@ struct CodeArray {
 enum class ArrayMethod {
   kPaper,         ///< aligned windows pairwise different, by rejection (Elahi et al. 2020, figure 2)
   kConstructive,  ///< every overlapping window unique, with a minimum Hamming distance
-  kNoRepeats,     ///< the same, and no run of letters recurs nearby in its row or column (core/code/runs.hpp)
+  kNoRepeats,     ///< the same, and no run of letters recurs nearby in its row or column (core/code/arrays/runs.hpp)
 };
 
 /// Name of a method in a pattern file or the configuration: "paper", "constructive", "no_repeats".

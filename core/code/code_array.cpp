@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cassert>
 
-#include "core/code/array_bounds.hpp"
-#include "core/code/constructive_array.hpp"
-#include "core/code/paper_array.hpp"
-#include "core/code/runs.hpp"
+#include "core/code/arrays/array_bounds.hpp"
+#include "core/code/arrays/constructive_array.hpp"
+#include "core/code/arrays/paper_array.hpp"
+#include "core/code/arrays/runs.hpp"
 
 namespace slsd {
 namespace {

@@ -5,10 +5,10 @@
 #include <iterator>
 #include <limits>
 
+#include "core/code/arrays/paper_array.hpp"
+#include "core/code/arrays/runs.hpp"
 #include "core/code/key_reader.hpp"
-#include "core/code/paper_array.hpp"
 #include "core/code/pattern.hpp"
-#include "core/code/runs.hpp"
 
 namespace slsd {
 namespace {

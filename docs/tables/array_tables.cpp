@@ -2,8 +2,8 @@
 // Copyright the slsd authors
 #include "docs/tables/array_tables.hpp"
 
+#include "core/code/arrays/runs.hpp"
 #include "core/code/code_array.hpp"
-#include "core/code/runs.hpp"
 #include "core/code/symbol.hpp"
 #include "docs/tables/shipped_patterns.hpp"
 #include "docs/tables/table.hpp"

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/code/hamming_profile.hpp"
+#include "core/code/arrays/hamming_profile.hpp"
 
 namespace slsd {
 

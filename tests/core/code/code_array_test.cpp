@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/code/paper_array.hpp"
+#include "core/code/arrays/paper_array.hpp"
 #include "tests/core/code/naive_distance.hpp"
 
 namespace slsd {

@@ -4,8 +4,8 @@
 
 #include <cstdint>
 
+#include "core/code/arrays/letter_source.hpp"
 #include "core/code/code_array.hpp"
-#include "core/code/letter_source.hpp"
 
 namespace slsd {
 

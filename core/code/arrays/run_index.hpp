@@ -8,8 +8,8 @@
 namespace slsd {
 
 /// An index of the letters of parallel lines for the question "which letters would end a recurring run here?"
-/// (core/code/runs.hpp). It has one bit for each place of a line and each letter, so that one operation compares a run
-/// with 64 earlier ones.
+/// (core/code/arrays/runs.hpp). It has one bit for each place of a line and each letter, so that one operation compares
+/// a run with 64 earlier ones.
 /// @thread thread-bound
 class RunIndex {
  public:

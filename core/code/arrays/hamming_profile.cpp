@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/hamming_profile.hpp"
+#include "core/code/arrays/hamming_profile.hpp"
 
 #include <algorithm>
 #include <numeric>
 #include <vector>
 
-#include "core/code/window_index.hpp"
+#include "core/code/arrays/window_index.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/hamming_profile.hpp"
+#include "core/code/arrays/hamming_profile.hpp"
 
 #include <gtest/gtest.h>
 

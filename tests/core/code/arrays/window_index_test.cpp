@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/window_index.hpp"
+#include "core/code/arrays/window_index.hpp"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/code/letter_source.hpp"
+#include "core/code/arrays/letter_source.hpp"
 
 namespace slsd {
 namespace {

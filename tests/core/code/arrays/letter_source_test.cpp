@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/letter_source.hpp"
+#include "core/code/arrays/letter_source.hpp"
 
 #include <array>
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/paper_array.hpp"
+#include "core/code/arrays/paper_array.hpp"
 
 #include <unordered_set>
 
-#include "core/code/letter_source.hpp"
+#include "core/code/arrays/letter_source.hpp"
 
 namespace slsd {
 namespace {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/run_index.hpp"
+#include "core/code/arrays/run_index.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/code/letter_source.hpp"
+#include "core/code/arrays/letter_source.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/runs.hpp"
+#include "core/code/arrays/runs.hpp"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

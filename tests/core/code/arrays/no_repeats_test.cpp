@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "core/code/array_bounds.hpp"
+#include "core/code/arrays/array_bounds.hpp"
 #include "core/code/code_array.hpp"
 #include "tests/core/code/naive_distance.hpp"
 #include "tests/core/code/naive_runs.hpp"

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/run_index.hpp"
+#include "core/code/arrays/run_index.hpp"
 
 #include <algorithm>
 #include <cassert>
 
-#include "core/code/runs.hpp"
+#include "core/code/arrays/runs.hpp"
 
 namespace slsd {
 namespace {

@@ -9,8 +9,8 @@
 
 namespace slsd {
 
-/// Distance within which no run of letters recurs in its line (core/code/runs.hpp); 0: runs may recur anywhere. A reach
-/// beyond the end of the line covers the whole line.
+/// Distance within which no run of letters recurs in its line (core/code/arrays/runs.hpp); 0: runs may recur anywhere.
+/// A reach beyond the end of the line covers the whole line.
 struct RunReach {
   int along_rows = 0;     ///< columns
   int along_columns = 0;  ///< rows

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/array_bounds.hpp"
+#include "core/code/arrays/array_bounds.hpp"
 
 #include <algorithm>
 #include <tuple>
 
-#include "core/code/runs.hpp"
+#include "core/code/arrays/runs.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/window_index.hpp"
+#include "core/code/arrays/window_index.hpp"
 
 #include <algorithm>
 #include <cassert>

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/code/constructive_array.hpp"
+#include "core/code/arrays/constructive_array.hpp"
 
 #include <algorithm>
 #include <array>
 #include <utility>
 
-#include "core/code/letter_source.hpp"
-#include "core/code/run_index.hpp"
-#include "core/code/window_index.hpp"
+#include "core/code/arrays/letter_source.hpp"
+#include "core/code/arrays/run_index.hpp"
+#include "core/code/arrays/window_index.hpp"
 
 namespace slsd {
 namespace {
