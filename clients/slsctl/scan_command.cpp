@@ -14,7 +14,7 @@
 #include "core/mesh/mesh_grid.hpp"
 #include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
-#include "picture/render_cloud.hpp"
+#include "picture/cloud/render_cloud.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "picture/relief.hpp"
+#include "picture/cloud/relief.hpp"
 
 #include <string>
 

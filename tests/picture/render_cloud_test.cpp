@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "picture/render_cloud.hpp"
+#include "picture/cloud/render_cloud.hpp"
 
 #include <cmath>
 #include <limits>

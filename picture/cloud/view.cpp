@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "picture/view.hpp"
+#include "picture/cloud/view.hpp"
 
 #include <algorithm>
 #include <array>

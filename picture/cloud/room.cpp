@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "picture/room.hpp"
+#include "picture/cloud/room.hpp"
 
 #include <array>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
 
-#include "picture/relief.hpp"
+#include "picture/cloud/relief.hpp"
 #include "picture/ticks.hpp"
 
 namespace slsd {

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "picture/canvas.hpp"
-#include "picture/surface.hpp"
-#include "picture/view.hpp"
+#include "picture/cloud/surface.hpp"
+#include "picture/cloud/view.hpp"
 
 namespace slsd {
 

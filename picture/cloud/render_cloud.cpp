@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "picture/render_cloud.hpp"
+#include "picture/cloud/render_cloud.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,12 +8,12 @@
 
 #include "core/geometry/robust.hpp"
 #include "picture/canvas.hpp"
+#include "picture/cloud/relief.hpp"
+#include "picture/cloud/room.hpp"
+#include "picture/cloud/surface.hpp"
+#include "picture/cloud/view.hpp"
 #include "picture/depth_colour.hpp"
-#include "picture/relief.hpp"
-#include "picture/room.hpp"
-#include "picture/surface.hpp"
 #include "picture/ticks.hpp"
-#include "picture/view.hpp"
 
 namespace slsd {
 namespace {
