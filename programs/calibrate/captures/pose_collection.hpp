@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/calibrate/observe/observations.hpp"
-#include "programs/calibrate/session/board_look.hpp"
-#include "programs/calibrate/session/board_place.hpp"
+#include "programs/calibrate/session/guide/board_look.hpp"
+#include "programs/calibrate/session/guide/board_place.hpp"
 
 namespace slsd {
 

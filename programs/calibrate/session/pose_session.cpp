@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "programs/calibrate/session/coverage_text.hpp"
-#include "programs/calibrate/session/look_text.hpp"
+#include "programs/calibrate/session/guide/coverage_text.hpp"
+#include "programs/calibrate/session/guide/look_text.hpp"
 
 namespace slsd {
 namespace {

@@ -9,11 +9,11 @@
 #include <string_view>
 
 #include "programs/calibrate/captures/pose_collection.hpp"
+#include "programs/calibrate/session/guide/session_terminal.hpp"
+#include "programs/calibrate/session/guide/sign.hpp"
 #include "programs/calibrate/session/pose_recorder.hpp"
 #include "programs/calibrate/session/pose_source.hpp"
 #include "programs/calibrate/session/pose_taker.hpp"
-#include "programs/calibrate/session/session_terminal.hpp"
-#include "programs/calibrate/session/sign.hpp"
 #include "programs/latency/timepiece.hpp"
 
 namespace slsd {

@@ -9,7 +9,7 @@
 #include "programs/calibrate/captures/captured_pictures.hpp"
 #include "programs/calibrate/captures/pose_collection.hpp"
 #include "programs/calibrate/captures/pose_observer.hpp"
-#include "programs/calibrate/session/board_look.hpp"
+#include "programs/calibrate/session/guide/board_look.hpp"
 #include "programs/calibrate/session/pose_source.hpp"
 
 namespace slsd {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/calibrate/session/sign.hpp"
+#include "programs/calibrate/session/guide/sign.hpp"
 
 #include <algorithm>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/calibrate/session/coverage_text.hpp"
+#include "programs/calibrate/session/guide/coverage_text.hpp"
 
 #include <utility>
 #include <vector>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/calibrate/session/session_terminal.hpp"
+#include "programs/calibrate/session/guide/session_terminal.hpp"
 
 #include <chrono>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/calibrate/session/board_look.hpp"
+#include "programs/calibrate/session/guide/board_look.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/calibrate/session/look_text.hpp"
+#include "programs/calibrate/session/guide/look_text.hpp"
 
 #include <fmt/format.h>
 

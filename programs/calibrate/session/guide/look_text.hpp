@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "programs/calibrate/session/board_look.hpp"
+#include "programs/calibrate/session/guide/board_look.hpp"
 
 namespace slsd {
 
