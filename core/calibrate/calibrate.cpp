@@ -11,8 +11,8 @@
 #include "core/calibrate/judge/pose_list.hpp"
 #include "core/calibrate/judge/verdict.hpp"
 #include "core/calibrate/solve/adjustment.hpp"
-#include "core/calibrate/solve/initial_rig.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
+#include "core/calibrate/solve/start/initial_rig.hpp"
 #include "core/geometry/triangulate.hpp"
 
 namespace slsd {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/board/board.hpp"
-#include "core/calibrate/judge/verify.hpp"
 #include "core/calibrate/observe/observe_pose.hpp"
+#include "core/calibrate/verify/verify.hpp"
 #include "core/code/codebook.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/result.hpp"

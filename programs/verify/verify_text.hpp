@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "core/calibrate/judge/verify.hpp"
+#include "core/calibrate/verify/verify.hpp"
 
 namespace slsd {
 

@@ -10,9 +10,9 @@
 #include "core/calibrate/judge/depth_uncertainty.hpp"
 #include "core/calibrate/judge/grade.hpp"
 #include "core/calibrate/judge/pose_list.hpp"
-#include "core/calibrate/judge/reference_plane.hpp"
 #include "core/calibrate/observe/observations.hpp"
 #include "core/calibrate/solve/rig_model.hpp"
+#include "core/calibrate/verify/reference_plane.hpp"
 
 namespace slsd {
 

@@ -11,8 +11,8 @@
 
 #include "core/calibrate/judge/lit_surface.hpp"
 #include "core/calibrate/judge/view_demands.hpp"
-#include "core/calibrate/solve/corner_pose.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
+#include "core/calibrate/solve/start/corner_pose.hpp"
 #include "core/geometry/robust.hpp"
 
 namespace slsd {

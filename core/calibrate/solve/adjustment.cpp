@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "core/calibrate/solve/initial_rig.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
+#include "core/calibrate/solve/start/initial_rig.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/judge/reference_plane.hpp"
+#include "core/calibrate/verify/reference_plane.hpp"
 
 #include <cmath>
 #include <map>

@@ -9,7 +9,7 @@
 
 #include "core/calibrate/solve/point_residuals.hpp"
 #include "core/calibrate/solve/pose_influence.hpp"
-#include "core/calibrate/solve/resection.hpp"
+#include "core/calibrate/solve/start/resection.hpp"
 #include "tests/core/calibrate/plain_residuals.hpp"
 #include "tests/core/calibrate/synthetic_rig.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/judge/verify.hpp"
+#include "core/calibrate/verify/verify.hpp"
 
 #include <cmath>
 #include <random>

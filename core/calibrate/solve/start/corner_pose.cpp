@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/solve/corner_pose.hpp"
+#include "core/calibrate/solve/start/corner_pose.hpp"
 
 #include <algorithm>
 #include <vector>

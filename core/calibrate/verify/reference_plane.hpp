@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/calibrate/judge/verify.hpp"
 #include "core/calibrate/observe/observations.hpp"
+#include "core/calibrate/verify/verify.hpp"
 #include "core/geometry/calibration.hpp"
 
 namespace slsd {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/judge/trueness.hpp"
+#include "core/calibrate/verify/trueness.hpp"
 
 #include <algorithm>
 #include <cmath>

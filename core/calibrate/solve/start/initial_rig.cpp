@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/solve/initial_rig.hpp"
+#include "core/calibrate/solve/start/initial_rig.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@
 
 #include "core/calibrate/solve/bundle.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
-#include "core/calibrate/solve/resection.hpp"
+#include "core/calibrate/solve/start/resection.hpp"
 #include "core/geometry/robust.hpp"
 
 namespace slsd {

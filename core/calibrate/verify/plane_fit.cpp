@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/judge/plane_fit.hpp"
+#include "core/calibrate/verify/plane_fit.hpp"
 
 #include <algorithm>
 #include <cmath>

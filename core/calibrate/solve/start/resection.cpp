@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/solve/resection.hpp"
+#include "core/calibrate/solve/start/resection.hpp"
 
 #include <algorithm>
 #include <cmath>

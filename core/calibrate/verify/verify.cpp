@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/judge/verify.hpp"
+#include "core/calibrate/verify/verify.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -12,8 +12,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 
-#include "core/calibrate/judge/plane_fit.hpp"
 #include "core/calibrate/solve/point_residuals.hpp"
+#include "core/calibrate/verify/plane_fit.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/geometry/triangulate.hpp"
 

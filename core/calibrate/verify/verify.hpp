@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/calibrate/judge/trueness.hpp"
 #include "core/calibrate/observe/observations.hpp"
+#include "core/calibrate/verify/trueness.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/geometry/epipolar_limit.hpp"
 #include "core/result.hpp"

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/calibrate/judge/plane_fit.hpp"
 #include "core/calibrate/observe/observations.hpp"
+#include "core/calibrate/verify/plane_fit.hpp"
 #include "core/geometry/lens.hpp"
 
 namespace slsd {
