@@ -4,7 +4,7 @@
 
 #include <cstdio>
 
-#include "tests/adversary/scene_kinds.hpp"
+#include "tests/adversary/scenes/scene_kinds.hpp"
 
 namespace slsd::adversary {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "tests/adversary/misled.hpp"
-#include "tests/adversary/scene_frames.hpp"
+#include "tests/adversary/scenes/scene_frames.hpp"
 
 namespace slsd::adversary {
 namespace {

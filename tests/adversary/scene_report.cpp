@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include "tests/adversary/scene_report.hpp"
 
-#include "tests/adversary/scene_frames.hpp"
+#include "tests/adversary/scenes/scene_frames.hpp"
 
 namespace slsd::adversary {
 

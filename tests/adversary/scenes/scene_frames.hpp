@@ -8,9 +8,9 @@
 #include "core/cloud/cloud.hpp"
 #include "core/code/pattern.hpp"
 #include "core/geometry/calibration.hpp"
-#include "tests/adversary/depth_scene.hpp"
-#include "tests/adversary/scene_kinds.hpp"
-#include "tests/adversary/scene_light.hpp"
+#include "tests/adversary/scenes/depth_scene.hpp"
+#include "tests/adversary/scenes/scene_kinds.hpp"
+#include "tests/adversary/scenes/scene_light.hpp"
 
 namespace slsd::adversary {
 

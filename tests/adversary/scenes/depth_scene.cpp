@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "tests/adversary/depth_scene.hpp"
+#include "tests/adversary/scenes/depth_scene.hpp"
 
 #include <algorithm>
 #include <cmath>

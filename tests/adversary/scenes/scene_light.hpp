@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/image.hpp"
-#include "tests/adversary/depth_scene.hpp"
 #include "tests/adversary/random_numbers.hpp"
+#include "tests/adversary/scenes/depth_scene.hpp"
 
 namespace slsd::adversary {
 

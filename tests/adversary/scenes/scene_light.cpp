@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "tests/adversary/scene_light.hpp"
+#include "tests/adversary/scenes/scene_light.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -10,7 +10,7 @@
 #include "core/decode/decoder.hpp"
 #include "tests/adversary/frames.hpp"
 #include "tests/adversary/report_table.hpp"
-#include "tests/adversary/scene_frames.hpp"
+#include "tests/adversary/scenes/scene_frames.hpp"
 
 namespace slsd::adversary {
 namespace {

@@ -5,8 +5,8 @@
 #include <span>
 #include <string_view>
 
-#include "tests/adversary/depth_scene.hpp"
 #include "tests/adversary/random_numbers.hpp"
+#include "tests/adversary/scenes/depth_scene.hpp"
 
 namespace slsd::adversary {
 
