@@ -8,7 +8,7 @@
 #include <string>
 
 #include "messages.hpp"
-#include "network.hpp"
+#include "network/network.hpp"
 
 namespace slsd::dds {
 

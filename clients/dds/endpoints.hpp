@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "network.hpp"
+#include "network/network.hpp"
 
 namespace slsd::dds {
 

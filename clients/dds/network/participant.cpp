@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "participant.hpp"
+#include "network/participant.hpp"
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
@@ -16,7 +16,7 @@
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 
 #include "drivers/system/file_descriptor.hpp"
-#include "loopback.hpp"
+#include "network/loopback.hpp"
 
 namespace slsd::dds {
 namespace {

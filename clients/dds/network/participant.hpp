@@ -5,7 +5,7 @@
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 
 #include "core/result.hpp"
-#include "network_options.hpp"
+#include "network/network_options.hpp"
 
 namespace slsd::dds {
 

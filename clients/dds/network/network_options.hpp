@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "discovery.hpp"
+#include "network/discovery.hpp"
 
 namespace slsd::dds {
 

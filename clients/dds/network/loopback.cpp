@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "loopback.hpp"
+#include "network/loopback.hpp"
 
 #include <algorithm>
 #include <utility>

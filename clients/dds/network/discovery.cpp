@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "discovery.hpp"
+#include "network/discovery.hpp"
 
 #include <map>
 #include <sstream>

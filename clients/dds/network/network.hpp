@@ -13,7 +13,7 @@
 
 #include "cdr.hpp"
 #include "core/result.hpp"
-#include "network_options.hpp"
+#include "network/network_options.hpp"
 #include "ros.hpp"
 
 namespace slsd::dds {
