@@ -13,7 +13,7 @@ import unittest
 from browser import Browser, is_there
 from page_service import TOKEN, Web, resident_mib
 from calibrate_test import BOARD, stage
-from command_line_test import write_clipped
+from clipped_frame import write_clipped
 from gige_double import Double, service_on
 from point_cloud import vertices
 from service import Service, wait_until
