@@ -75,65 +75,62 @@ TEST(DecodeLanes, DeliverInTheOrderOfArrivalWhicheverLaneIsQuicker) {
   EXPECT_EQ(lanes.skipped(), 0U);
 }
 
-TEST(DecodeLanes, NewestOfferedWinsAndThoseSkippedAreCounted) {
-  NumberJob::Log log;
-  Gate gate;
-  DecodeLanes lanes(1);
-  lanes.offer(std::make_unique<NumberJob>(0, log, gate.work()));
-  gate.wait_inside(1);
-  const auto now = steady_clock::now();
-  for (int i = 1; i <= 5; ++i) lanes.offer(std::make_unique<NumberJob>(i, log), now);
-  EXPECT_EQ(lanes.skipped(), 2U);
-  gate.opened.set_value();
-  wait_for(lanes, 6);
-  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{3, true},
-                                          NumberJob::Delivered{4, true}, NumberJob::Delivered{5, true}));
+/// One lane, whose job 0 is under way until the gate opens.
+class BusyLane : public ::testing::Test {
+ protected:
+  BusyLane() {
+    lanes_.offer(std::make_unique<NumberJob>(0, log_, gate_.work()));
+    gate_.wait_inside(1);
+  }
+  [[nodiscard]] std::shared_ptr<FrameJob> job(int number) { return std::make_unique<NumberJob>(number, log_); }
+  void finish(std::uint64_t done) {
+    gate_.opened.set_value();
+    wait_for(lanes_, done);
+  }
+  /// Tells that job 0 and then these were delivered, all computed.
+  void expect_computed(const std::vector<int>& others) const {
+    NumberJob::Log expected{{0, true}};
+    for (const int number : others) expected.push_back({number, true});
+    EXPECT_EQ(log_, expected);
+  }
+
+  NumberJob::Log log_;
+  Gate gate_;
+  DecodeLanes lanes_{1};
+  const std::chrono::steady_clock::time_point now_ = steady_clock::now();
+};
+
+TEST_F(BusyLane, NewestOfferedWinsAndThoseSkippedAreCounted) {
+  for (int i = 1; i <= 5; ++i) lanes_.offer(job(i), now_);
+  EXPECT_EQ(lanes_.skipped(), 2U);
+  finish(6);
+  expect_computed({3, 4, 5});
 }
 
-TEST(DecodeLanes, WhatHasWaitedForTooLongMakesRoom) {
-  NumberJob::Log log;
-  Gate gate;
-  DecodeLanes lanes(1);
-  lanes.offer(std::make_unique<NumberJob>(0, log, gate.work()));
-  gate.wait_inside(1);
-  auto now = steady_clock::now();
-  for (int i = 1; i <= 3; ++i) lanes.offer(std::make_unique<NumberJob>(i, log), now += DecodeLanes::kTurn + 1ms);
-  EXPECT_EQ(lanes.skipped(), 2U);
-  gate.opened.set_value();
-  wait_for(lanes, 4);
-  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{3, true}));
+TEST_F(BusyLane, WhatHasWaitedForTooLongMakesRoom) {
+  for (int i = 1; i <= 3; ++i) lanes_.offer(job(i), now_ + i * (DecodeLanes::kTurn + 1ms));
+  EXPECT_EQ(lanes_.skipped(), 2U);
+  finish(4);
+  expect_computed({3});
 }
 
-TEST(DecodeLanes, WhatWasPushedIsNeverSkipped) {
-  NumberJob::Log log;
-  Gate gate;
-  DecodeLanes lanes(1);
-  lanes.push(std::make_unique<NumberJob>(0, log, gate.work()));
-  gate.wait_inside(1);
-  lanes.push(std::make_unique<NumberJob>(1, log));
-  const auto now = steady_clock::now();
-  for (int i = 2; i <= 4; ++i) lanes.offer(std::make_unique<NumberJob>(i, log), now + i * DecodeLanes::kTurn * 2);
-  EXPECT_EQ(lanes.skipped(), 2U);
-  gate.opened.set_value();
-  wait_for(lanes, 5);
-  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{1, true},
-                                          NumberJob::Delivered{4, true}));
+TEST_F(BusyLane, WhatWasPushedIsNeverSkipped) {
+  lanes_.push(job(1));
+  for (int i = 2; i <= 4; ++i) lanes_.offer(job(i), now_ + i * DecodeLanes::kTurn * 2);
+  EXPECT_EQ(lanes_.skipped(), 2U);
+  finish(5);
+  expect_computed({1, 4});
 }
 
-TEST(DecodeLanes, StopDeliversWhatWasNotComputed) {
-  NumberJob::Log log;
-  Gate gate;
-  DecodeLanes lanes(1);
-  lanes.push(std::make_unique<NumberJob>(0, log, gate.work()));
-  gate.wait_inside(1);
-  lanes.push(std::make_unique<NumberJob>(1, log));
-  lanes.request_stop();
-  EXPECT_FALSE(lanes.stopped());
-  gate.opened.set_value();
-  while (!lanes.stopped()) std::this_thread::sleep_for(1ms);
-  lanes.push(std::make_unique<NumberJob>(2, log));
-  EXPECT_THAT(log, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{1, false},
-                                          NumberJob::Delivered{2, false}));
+TEST_F(BusyLane, StopDeliversWhatWasNotComputed) {
+  lanes_.push(job(1));
+  lanes_.request_stop();
+  EXPECT_FALSE(lanes_.stopped());
+  gate_.opened.set_value();
+  while (!lanes_.stopped()) std::this_thread::sleep_for(1ms);
+  lanes_.push(job(2));
+  EXPECT_THAT(log_, ::testing::ElementsAre(NumberJob::Delivered{0, true}, NumberJob::Delivered{1, false},
+                                           NumberJob::Delivered{2, false}));
 }
 
 TEST(DecodeLanes, WaitDoneEndsWithAJobTheTimeOrNothingUnderWay) {
