@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "clients/slsctl/client_commands.hpp"
@@ -186,12 +187,21 @@ void add_light(CLI::App& app, ClientOptions& options) {
                                 "  slsctl light\n  slsctl light --camera left --picture light.png\n");
   CLI::Option* camera = light->add_option("--camera", options.camera, "which camera (the first)")->type_name("NAME");
   light->add_option("--from", options.from, "read one or two frames from files, without the service")
-      ->expected(1, 2)
+      ->expected(1, -1)  // wrong_frames() limits them, with a better message
       ->excludes(camera)
       ->type_name("FRAME.png");
   light->add_option("--picture", options.picture, "write the frame with clipping, room light and blur drawn in")
       ->type_name("FILE.png");
   add_timeout(light, options);
+}
+
+/// The error in the frames of --from; empty: none.
+std::string wrong_frames(const ClientOptions& options) {
+  constexpr std::size_t kMost = 2;
+  if (options.from.size() <= kMost) return {};
+  return fmt::format("--from takes one or two frames of one camera, not {}: leave out {}{}", options.from.size(),
+                     slsd::quoted(options.from[kMost].string()),
+                     options.from.size() > kMost + 1 ? " and those after it" : "");
 }
 
 void add_project(CLI::App& app, ClientOptions& options) {
@@ -286,7 +296,9 @@ int main(int argc, char** argv) {
   std::string command;
   const auto check = [&] {
     command = app.get_subcommands().front()->get_name();
-    if (const auto wrong = slsd::wrong_outputs(options, command); !wrong.empty()) throw CLI::ValidationError(wrong);
+    auto wrong = wrong_frames(options);
+    if (wrong.empty()) wrong = slsd::wrong_outputs(options, command);
+    if (!wrong.empty()) throw CLI::ValidationError(wrong);
   };
   if (const auto ended = slsd::parse_usage(app, static_cast<int>(arguments.size()), arguments.data(), check))
     return *ended;

@@ -217,6 +217,10 @@ class Usage(unittest.TestCase):
                  ("watch", "--count", "1.5"): "slsctl watch: --count takes a whole number",
                  ("watch", "--count"): "slsctl watch: --count needs a value",
                  ("status", "now"): 'slsctl status: unexpected argument "now"',
+                 ("light", "--from", "a.png", "b.png", "c.png"):
+                     'slsctl light: --from takes one or two frames of one camera, not 3: leave out "c.png"',
+                 ("light", "--from", "a.png", "b.png", "c.png", "d.png", "--json"):
+                     'slsctl light: --from takes one or two frames of one camera, not 4: leave out "c.png" and those after it',
                  ("frame",): "slsctl frame: FILE is missing: the PNG to write; - is standard output"}
         for arguments, problem in cases.items():
             with self.subTest(arguments=arguments):
