@@ -122,6 +122,7 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   parts_->triangulate(lattice, level, shared);
   parts_->reader.list_off_line(parts_->decoding.off_line);
   parts_->reader.report(parts_->decoding);
+  parts_->decoding.light = symbol_light(lattice, level, parts_->reader.edge_blur_px());
   if (observer != nullptr) observer->stage_done(Stage::kTriangulate);
   return &parts_->decoding;
 }

@@ -13,6 +13,7 @@
 #include "core/cloud/cloud.hpp"
 #include "core/decode/centres/symbol_match.hpp"
 #include "core/decode/rules.hpp"
+#include "core/decode/symbol_light.hpp"
 #include "core/regions/direction.hpp"
 
 namespace slsd {
@@ -56,6 +57,7 @@ struct Decoding {
   std::vector<SymbolMatch> off_line;
   RegionCounts counts{};  ///< regions by status
   RuleCounts rules{};     ///< regions by rule, and regions that each guard rejected
+  SymbolLight light{};
 
   [[nodiscard]] std::uint32_t count(RegionStatus status) const { return counts[static_cast<std::size_t>(status)]; }
 };

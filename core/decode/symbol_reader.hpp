@@ -66,6 +66,8 @@ class SymbolReader {
   [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern.pattern(); }
   /// Returns the noise of the last frame.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
+  /// Blur at the sharpest edges of the last frame, one standard deviation; 0 if there are none, or by the paper's way.
+  [[nodiscard]] float edge_blur_px() const { return finder_.edge_blur_px(); }
   [[nodiscard]] const CellRays& cells() const { return fixed_->cells; }
   /// Number of shapes of a symbol's size in the last frame.
   [[nodiscard]] std::size_t shapes() const { return seen_.size(); }

@@ -26,6 +26,7 @@ void ScanStatistics::note(const Result<ScanResult>& scan, std::uint64_t skipped)
   for (std::size_t i = 0; i < scan->regions.size(); ++i) totals_.regions[i] += scan->regions[i];
   totals_.rules_of_last = scan->rules;
   for (std::size_t i = 0; i < scan->rules.size(); ++i) totals_.rules[i] += scan->rules[i];
+  if (!scan->light.empty()) totals_.light = scan->light;
   totals_.capture.add(scan->capture_time);
   totals_.decode.add(scan->decode_time);
   for (std::size_t i = 0; i < scan->stage_times.size(); ++i) totals_.stages[i].add(scan->stage_times[i]);

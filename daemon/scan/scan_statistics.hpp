@@ -9,6 +9,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/duration.hpp"
 #include "core/result.hpp"
@@ -29,7 +30,8 @@ struct ScanTotals {
   RegionCounts regions_of_last{};
   std::array<std::uint64_t, kDecodeRuleCount> rules{};
   RuleCounts rules_of_last{};
-  std::uint64_t skipped = 0;  ///< sets of frames in free run that were skipped for newer ones
+  std::vector<CameraLight> light;  ///< of the last scan that measured it
+  std::uint64_t skipped = 0;       ///< sets of frames in free run that were skipped for newer ones
   Duration capture;
   Duration decode;
   Duration latency;  ///< time from the last byte of a scan's frames to its cloud at a client's socket

@@ -34,6 +34,17 @@ class Scan(unittest.TestCase):
         self.assertGreater(len(points), 2000)
         self.assertTrue(all(abs(z - 2000) < 20 for _, _, z in points))
 
+    def test_tells_the_light_of_each_camera(self):
+        with self.service.client() as client:
+            light = client.call("scan")[0]["light"]
+            client.call("subscribe")
+            streamed = client.receive()[0]["params"]["light"]
+        self.assertEqual(list(light), ["camera"])
+        self.assertEqual(light["camera"]["clipped_share"], 0)
+        self.assertTrue(0 < light["camera"]["room_light"] < 0.5, light)
+        self.assertTrue(0.5 < light["camera"]["blur_px"] < 1.5, light)
+        self.assertEqual(streamed, light)
+
     def test_gives_pcd_and_names_each_scan(self):
         with self.service.client() as client:
             first, cloud = client.call("scan", format="pcd")
@@ -185,6 +196,7 @@ class Faults(unittest.TestCase):
             with Service(camera_path=SCENE / image) as service, service.client() as client:
                 result, cloud = client.call("scan")
                 self.assertEqual((result["points"], vertices(cloud)), (0, []))
+                self.assertEqual(result["light"], {"camera": {}})
 
     def test_frame_of_another_size_is_an_error(self):
         with Service(camera_path=SCENE / "small.png") as service, service.client() as client:

@@ -46,10 +46,12 @@ class Texture(unittest.TestCase):
         _, client = self.serve()
         plain, cloud = client.call("scan")
         self.assertNotIn("saturated", plain)
+        self.assertIn("camera", plain["light"])
         symbols = intensities(cloud)
         # The first scan's frame had the number 0 of each folder, and this one's is its 1st again: one image loops.
         textured, cloud = client.call("scan", texture=True, ambient=True)
         self.assertGreaterEqual(textured["points"], plain["points"])
+        self.assertNotIn("light", textured)
         self.assertEqual((textured["saturated"], set(intensities(cloud))), (textured["points"], {255}))
         _, cloud = client.call("scan", texture=True)
         self.assertEqual(set(intensities(cloud)), {90})

@@ -58,7 +58,8 @@ GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& exe
   }
   binarizer_.binarize(frame, full, noise, mask_, executor);
   noise_ = binarizer_.noise();
-  if (binarizer_.edge_blur_px() >= kBlurMinPx) return binarize_blurred(frame, full, executor);
+  edge_blur_px_ = binarizer_.edge_blur_px();
+  if (edge_blur_px_ >= kBlurMinPx) return binarize_blurred(frame, full, executor);
   // A frame without contrast is empty, unless the reader knows that noise may hide the whole pattern.
   const float contrast_sigma = binarizer_.usual_contrast_sigma();
   const bool is_faint = contrast_sigma > 0 ? contrast_sigma < kFaintSigma : noise.has_value();
@@ -67,7 +68,7 @@ GreyView ShapeFinder::binarize(const GreyView& frame, double full, Executor& exe
 
 GreyView ShapeFinder::binarize_blurred(const GreyView& frame, double full, Executor& executor) {
   const float symbol_px = symbol_size_px_ * expected_.in_the_middle().scale;
-  const float undone_px = std::min(kBlurUndone * binarizer_.edge_blur_px(), kBlurMax * symbol_px);
+  const float undone_px = std::min(kBlurUndone * edge_blur_px_, kBlurMax * symbol_px);
   const GreyView sharp = sharpener_.sharpen(frame, undone_px, full).view();
   frame_levels_ = kSharpenedFull / 255;
   binarizer_.binarize(sharp, kSharpenedFull, mask_, executor);

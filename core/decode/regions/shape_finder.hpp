@@ -53,6 +53,9 @@ class ShapeFinder {
   [[nodiscard]] float frame_levels() const { return frame_levels_; }
   /// Returns the noise of the frame that binarize() returned.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
+  /// Blur at the sharpest edges of the frame itself, one standard deviation; 0 if there are none, or by the paper's
+  /// way.
+  [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
 
  private:
   GreyView binarize_blurred(const GreyView& frame, double full, Executor& executor);
@@ -75,7 +78,7 @@ class ShapeFinder {
   Regions regions_;
   std::vector<DecodeRule> rule_;
   FrameNoise noise_;
-  float frame_levels_ = 1;
+  float frame_levels_ = 1, edge_blur_px_ = 0;
 };
 
 }  // namespace slsd

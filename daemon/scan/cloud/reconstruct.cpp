@@ -146,6 +146,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     }
     const std::size_t before = result.cloud.points.size();
     append(**decoding, decoder.camera_index(), result);
+    if (!light.white) result.light.push_back({setup.camera_names[i], (*decoding)->light});
     const std::vector<CloudPoint> strays = stray_symbols(**decoding, decoder.camera_index());
     result.strays.insert(result.strays.end(), strays.begin(), strays.end());
     shade(std::span(result.cloud.points).subspan(before), light, result);

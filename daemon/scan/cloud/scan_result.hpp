@@ -60,6 +60,12 @@ struct MergedCamera {
   std::string problem;  ///< why its scan uses the shorter exposure alone; empty: both are merged
 };
 
+/// The light in a camera's frame under the pattern.
+struct CameraLight {
+  std::string name;
+  SymbolLight light;
+};
+
 /// The coding of the frames that are kept beside a cloud.
 enum class FrameCoding { kNone, kRaw, kPng };
 
@@ -106,6 +112,7 @@ struct ScanResult {
   CloudFiles files = {};                         ///< the cloud in the requested formats
   LostTries lost = {};
   std::vector<MergedCamera> merged = {};              ///< one for each camera that takes two exposures
+  std::vector<CameraLight> light = {};                ///< one for each camera; none if a white frame was divided out
   std::vector<CloudPoint> strays;                     ///< symbols that a knocked rig has displaced: see stray_symbols()
   RegionCounts regions{};                             ///< regions of all cameras, by status
   RuleCounts rules{};                                 ///< the same regions, by the rule that decided

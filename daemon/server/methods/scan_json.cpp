@@ -58,6 +58,19 @@ json exposures_json(const std::vector<MergedCamera>& cameras) {
   return result;
 }
 
+// By camera, as far as it was measured.
+json light_json(const std::vector<CameraLight>& cameras) {
+  json result = json::object();
+  for (const auto& [name, light] : cameras) {
+    json& about = result[name] = json::object();
+    for (const auto& [key, value] : {std::pair("clipped_share", light.clipped_share),
+                                     std::pair("room_light", light.room_light), std::pair("blur_px", light.blur_px)}) {
+      if (value) about[key] = rounded(*value);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 double latency_ms(MonotonicTime received) {
@@ -87,6 +100,7 @@ json scan_json(const ScanResult& scan, Density density) {
   } else if (!scan.empty.empty()) {
     result["empty"] = scan.empty;
   }
+  if (!scan.light.empty()) result["light"] = light_json(scan.light);
   if (!scan.merged.empty()) result["exposures"] = exposures_json(scan.merged);
   result["tries"] = scan.lost.count + 1;
   if (scan.lost.count > 0) {
