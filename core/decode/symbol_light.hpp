@@ -10,12 +10,10 @@ namespace slsd {
 
 /// The light of a frame, as its decoded symbols show it. Decoding measures all of this anyway.
 struct SymbolLight {
-  std::optional<float> clipped_share = {};  ///< share of the symbols that reach the full level, 0 to 1; empty: none
-                                            ///< were decoded
-  std::optional<float> room_light = {};     ///< light between the symbols relative to what the projector adds, of the
-                                            ///< usual symbol; empty: none were decoded
-  std::optional<float> blur_px = {};        ///< blur at the frame's sharpest edges, one standard deviation; empty: there
-                                            ///< are no edges
+  std::optional<float> clipped_share = {};  ///< share of the symbols within a twentieth of the full level, 0 to 1;
+                                            ///< empty: none were decoded
+  std::optional<float> edge_px = {};        ///< blur at the sharpest edges, one standard deviation, to a tenth as
+                                            ///< LightLevels::edge_px; empty: there are no edges
 };
 
 /// @param full          the level of a saturated pixel of the frame

@@ -74,7 +74,7 @@ class View(unittest.TestCase):
             self.assertEqual(now.value("slsd_pixels_total", status=status), count)
         for figure, value in dense["light"]["camera"].items():
             self.assertAlmostEqual(now.value(f"slsd_camera_{figure}", camera="camera"), value, 4)
-        self.assertEqual(len(dense["light"]["camera"]), 3)
+        self.assertEqual(len(dense["light"]["camera"]), 2)
         self.assertEqual(now.value("slsd_camera_frames_total", camera="camera"), 4)
         self.assertEqual(now.value("slsd_decode_seconds_count"), 4)
         self.assertAlmostEqual(now.value("slsd_decode_seconds_sum"), sum(r["decode_ms"] for r in replies) / 1000, 5)

@@ -41,8 +41,7 @@ class Scan(unittest.TestCase):
             streamed = client.receive()[0]["params"]["light"]
         self.assertEqual(list(light), ["camera"])
         self.assertEqual(light["camera"]["clipped_share"], 0)
-        self.assertTrue(0 < light["camera"]["room_light"] < 0.5, light)
-        self.assertTrue(0.5 < light["camera"]["blur_px"] < 1.5, light)
+        self.assertTrue(0.5 < light["camera"]["edge_px"] < 1.5, light)
         self.assertEqual(streamed, light)
 
     def test_gives_pcd_and_names_each_scan(self):

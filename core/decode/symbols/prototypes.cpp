@@ -34,7 +34,7 @@ struct Look {
 };
 
 /// Smallest difference between light and dark at which regions are split, of 255 levels.
-constexpr float kContrastMin = 8;
+constexpr float kGapContrastMin = 8;
 
 /// Reads views as the decoder does.
 /// @thread thread-bound: keeps its buffers
@@ -55,7 +55,7 @@ class Observer {
   /// Reads a view again after splitting what ran together in the last look.
   std::optional<Look> look_closer(const SymbolView& view) {
     const float reach = reach_px(view);
-    separator_.separate_all(view.image.view(), kContrastMin, regions_, [&](const Region& region) {
+    separator_.separate_all(view.image.view(), kGapContrastMin, regions_, [&](const Region& region) {
       return static_cast<float>(std::max(region.width_px(), region.height_px())) > 2 * reach;
     });
     return measure(view);

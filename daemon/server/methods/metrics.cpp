@@ -147,16 +147,13 @@ void tell_scans(const ServiceState& state, Exposition& out) {
   const auto light = [&](std::string_view name, std::string_view help, std::optional<float> SymbolLight::*figure,
                          std::string_view unit = {}) {
     out.family(name, "gauge", help, unit);
-    for (const CameraLight& camera : totals.light) {
-      if (const auto& value = camera.light.*figure) out.sample(*value, {{"camera", camera.name}});
-    }
+    for (const auto& [camera, seen] : totals.light)
+      if (seen.*figure) out.sample(*(seen.*figure), {{"camera", camera}});
   };
-  light("slsd_camera_clipped_share", "Share of the last scan's decoded symbols that reach the full level.",
+  light("slsd_camera_clipped_share", "Share of the last scan's decoded symbols that are saturated, or nearly.",
         &SymbolLight::clipped_share);
-  light("slsd_camera_room_light", "Light between the last scan's symbols over what the projector adds.",
-        &SymbolLight::room_light);
-  light("slsd_camera_blur_px", "Blur at the sharpest edges of the last scan's frame, one standard deviation.",
-        &SymbolLight::blur_px, "px");
+  light("slsd_camera_edge_px", "Blur at the sharpest edges of the last scan's frame, one standard deviation.",
+        &SymbolLight::edge_px, "px");
   out.family("slsd_pixels", "counter", "Pixels of all dense clouds, by status: measured, or the reason why not.");
   for (std::size_t i = 0; i < totals.pixels.size(); ++i)
     out.sample(static_cast<double>(totals.pixels[i]), {{"status", to_string(static_cast<DensePixel>(i))}});

@@ -63,10 +63,8 @@ json light_json(const std::vector<CameraLight>& cameras) {
   json result = json::object();
   for (const auto& [name, light] : cameras) {
     json& about = result[name] = json::object();
-    for (const auto& [key, value] : {std::pair("clipped_share", light.clipped_share),
-                                     std::pair("room_light", light.room_light), std::pair("blur_px", light.blur_px)}) {
-      if (value) about[key] = rounded(*value);
-    }
+    if (light.clipped_share) about["clipped_share"] = rounded(*light.clipped_share);
+    if (light.edge_px) about["edge_px"] = rounded(*light.edge_px);
   }
   return result;
 }

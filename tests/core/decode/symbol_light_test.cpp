@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "core/decode/decoder.hpp"
+#include "core/exposure/light_levels.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd {
@@ -18,41 +19,44 @@ LatticeSymbol lit(float background, float gain) {
   return symbol;
 }
 
-TEST(SymbolLight, CountsSymbolsAtTheFullLevel) {
-  const Lattice lattice{{lit(20, 100), lit(20, 231), lit(20, 232), lit(100, 200)}};
+TEST(SymbolLight, CountsSymbolsNearTheFullLevel) {
+  const Lattice lattice{{lit(20, 100), lit(20, 222), lit(20, 223), lit(100, 200)}};
   EXPECT_THAT(symbol_light(lattice, 255, 1).clipped_share, Optional(0.5F));
   EXPECT_THAT(symbol_light(lattice, 4095, 1).clipped_share, Optional(0.F));
 }
 
-TEST(SymbolLight, TakesTheRoomsLightOfTheUsualSymbol) {
-  EXPECT_THAT(symbol_light({{lit(50, 100), lit(10, 100), lit(300, 100)}}, 255, 1).room_light, Optional(0.5F));
-  EXPECT_THAT(symbol_light({{lit(-2, 100)}}, 255, 1).room_light, Optional(0.F));
-}
-
-TEST(SymbolLight, IsEmptyWhereNothingWasSeen) {
+TEST(SymbolLight, IsEmptyIfNothingWasSeen) {
   const SymbolLight none = symbol_light({}, 255, 0);
   EXPECT_EQ(none.clipped_share, std::nullopt);
-  EXPECT_EQ(none.room_light, std::nullopt);
-  EXPECT_EQ(none.blur_px, std::nullopt);
+  EXPECT_EQ(none.edge_px, std::nullopt);
 }
 
-/// The light of a wall as its decoder sees it.
-SymbolLight seen_of(const SimulationOptions& light) {
-  static const Pattern pattern = *make_pattern({});
-  static auto decoder = *Decoder::create(IndexedPattern(pattern), paper_rig(), 0, {});
-  const Grey8 frame = simulate(draw_pattern(pattern), paper_rig(), plane({0, 0, 2000}, {0, 0, 1}), light);
-  return (*decoder.decode(frame.view(), 255))->light;
+/// Of a wall that a decoder reads.
+class SymbolLightOfAWall : public testing::Test {
+ protected:
+  Grey8 seen(double lit, double blur_sigma_px) const {
+    return simulate(draw_pattern(pattern_), paper_rig(), plane({0, 0, 2000}, {0, 0, 1}),
+                    {.dark = 40, .lit = lit, .blur_sigma_px = blur_sigma_px});
+  }
+  SymbolLight light_of(const Grey8& frame) { return (*decoder_.decode(frame.view(), 255))->light; }
+
+  const Pattern pattern_ = *make_pattern({});
+  Decoder decoder_ = *Decoder::create(IndexedPattern(pattern_), paper_rig(), 0, {});
+};
+
+TEST_F(SymbolLightOfAWall, SeesClippingAsTheTilesOfTheFrameDo) {
+  for (const double lit : {200, 240, 280, 400}) {
+    const Grey8 frame = seen(lit, 0.8);
+    EXPECT_NEAR(light_of(frame).clipped_share.value(), measure_light(frame.view(), 255).clipped_share, 0.02) << lit;
+  }
 }
 
-TEST(SymbolLight, FollowsTheScene) {
-  const SymbolLight fine = seen_of({.dark = 40, .lit = 200, .blur_sigma_px = 0.8});
-  EXPECT_THAT(fine.clipped_share, Optional(0.F));
-  EXPECT_NEAR(fine.room_light.value(), 40. / 160, 0.06);
-  const SymbolLight bright = seen_of({.dark = 40, .lit = 400, .blur_sigma_px = 0.8});
-  EXPECT_GT(bright.clipped_share.value(), 0.9);
-  const SymbolLight blurred = seen_of({.dark = 40, .lit = 200, .blur_sigma_px = 2});
-  EXPECT_NEAR(blurred.blur_px.value(), 2, 0.5);
-  EXPECT_LT(fine.blur_px.value(), 1.2);
+TEST_F(SymbolLightOfAWall, SeesBlurAsTheTilesOfTheFrameDo) {
+  for (const double blur_sigma_px : {0.5, 0.8, 1.5, 2.0}) {
+    const Grey8 frame = seen(200, blur_sigma_px);
+    const double tiles_px = measure_light(frame.view(), 255).edge_px;
+    EXPECT_NEAR(light_of(frame).edge_px.value(), tiles_px, 0.1 * tiles_px) << blur_sigma_px;
+  }
 }
 
 }  // namespace

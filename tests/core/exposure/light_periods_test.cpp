@@ -100,8 +100,8 @@ TEST(ExposureMisfit, NamesThePeriodAndTheNearestExposures) {
 }
 
 TEST(ExposureMisfit, NamesTheOnlyExposureThatIsNear) {
-  EXPECT_THAT(exposure_misfit(999'000, kDlp), ::testing::EndsWith(": set 983333 or 1000000"));
-  EXPECT_THAT(exposure_misfit(1'010'500, kDlp), ::testing::EndsWith(": set 1000000"));
+  EXPECT_THAT(exposure_misfit(20'000, {.refresh_hz = 24.0}), ::testing::EndsWith(": set 41667"));
+  EXPECT_THAT(exposure_misfit(1'020'000, {.refresh_hz = 24.0}), ::testing::EndsWith(": set 1000000"));
 }
 
 TEST(ExposureMisfit, IsEmptyIfTheExposureSuits) {

@@ -44,7 +44,7 @@ TEST(Exposition, EscapesLabels) {
 
 TEST(Exposition, AddsUpTheBucketsOfAHistogram) {
   Duration duration;
-  for (const auto time : {1ms, 900ms, 60s}) duration.add(time);
+  for (const std::chrono::milliseconds time : {1ms, 900ms, 60000ms}) duration.add(time);
   Exposition out(MetricsFormat::kOpenMetrics);
   out.family("slsd_stage_seconds", "histogram", "Time.", "seconds");
   out.histogram(duration, "stage", "classify");

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/core/decode/alone.hpp"
+#include "tests/core/decode/grid/simulated_grid.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 #include "tests/simulator/simulator.hpp"
 

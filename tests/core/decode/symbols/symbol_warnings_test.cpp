@@ -27,14 +27,14 @@ TEST(PatternScale, IsOfThePapersRigWithoutACalibration) {
 }
 
 TEST(SymbolWarnings, AreNoneForTheDefaultPattern) {
-  EXPECT_THAT(symbol_warnings({}, 1.4), IsEmpty());
+  EXPECT_THAT(symbol_warnings(make_pattern({})->options, 1.4), IsEmpty());
 }
 
 TEST(SymbolWarnings, NameSymbolsThatTheCameraSeesTooSmall) {
   PatternOptions small;
   small.symbol_size_px = 8;
   small.spacing_px = 1;
-  EXPECT_THAT(symbol_warnings(small, 0.5), Contains(HasSubstr("at 8 px")));
+  EXPECT_THAT(symbol_warnings(make_pattern(small)->options, 0.5), Contains(HasSubstr("at 8 px")));
 }
 
 TEST(SymbolWarnings, SayWhyTheyCannotTell) {
