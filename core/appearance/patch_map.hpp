@@ -40,6 +40,16 @@ struct PatchMap {
                                       const Eigen::Vector3d& translation, const Lens& projector,
                                       double reference_inverse_depth);
 
+/// Offset of the pattern from its epipolar lines over the frame, projector px: the calibration's error, or a knock.
+struct EpipolarOffset {
+  Eigen::Vector2f middle_px = Eigen::Vector2f::Zero();  ///< middle of the frame
+  float middle = 0, slope_x = 0, slope_y = 0;           ///< offset there, and its change for one camera px
+
+  [[nodiscard]] float at(const Eigen::Vector2f& camera_px) const {
+    return middle + slope_x * (camera_px.x() - middle_px.x()) + slope_y * (camera_px.y() - middle_px.y());
+  }
+};
+
 /// Position of a patch of the surface, and the light on it.
 struct PatchState {
   float disparity = 0;                          ///< projector px relative to the reference

@@ -73,8 +73,9 @@ DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
     : fixed_(std::move(fixed)),
       grid_(fixed_->geometry, {stride_px(fixed_->geometry.camera.lens, fixed_->decode.dense), fixed_->window_px,
                                fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
+      refiner_(grid_),
       search_(fixed_->letters, fixed_->window_px),
-      follower_(fixed_->window_px),
+      follower_(refiner_.window_px()),
       judge_({fixed_->reach_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
       cleaner_(fixed_->geometry.camera, fixed_->geometry.projector, fixed_->rays) {}
 
@@ -93,7 +94,7 @@ int DenseMapper::window_px() const {
 }
 
 std::size_t DenseMapper::bytes() const {
-  return grid_.bytes() + follower_.bytes() + cleaner_.bytes() + map_.bytes();
+  return grid_.bytes() + refiner_.bytes() + follower_.bytes() + cleaner_.bytes() + map_.bytes();
 }
 
 std::size_t DenseMapper::bytes_of_fields(const Lens& projector) {
@@ -179,6 +180,10 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   }
   const PatternField& field = *field_;
   done(DenseStage::kFindBlur);
+  if (refiner_.lattice().step > 1) {
+    grid_.grow_coarse(seen, field, seeds_, refiner_.lattice(), executor);
+    refiner_.refine(seen, field, grid_, executor);
+  }
   grid_.grow(seen, field, seeds_, executor);
   done(DenseStage::kGrow);
   const auto of_symbols = static_cast<std::ptrdiff_t>(seeds_.size());

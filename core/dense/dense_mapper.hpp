@@ -14,6 +14,7 @@
 #include "core/dense/dense_map.hpp"
 #include "core/dense/follow_grid.hpp"
 #include "core/dense/pixel_judge.hpp"
+#include "core/dense/refine_grid.hpp"
 #include "core/dense/search_surface.hpp"
 #include "core/dense/surface_grid.hpp"
 #include "core/executor.hpp"
@@ -97,6 +98,7 @@ class DenseMapper {
 
   std::shared_ptr<const Fixed> fixed_;  // shared by mappers of several threads
   SurfaceGrid grid_;
+  GridRefiner refiner_;
   SurfaceSearch search_;
   GridFollower follower_;
   std::size_t followed_ = 0;  // nodes taken over in the last frame

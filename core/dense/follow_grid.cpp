@@ -32,7 +32,7 @@ constexpr double kStillMore = 0.2;
 /// Interval at which windows are sampled to count still nodes.
 constexpr std::size_t kSampled = 37;
 
-using enum FollowedFrame::Unknown;
+using enum Fitted::Unknown;
 constexpr int kPacked = FollowedFrame::kPacked;
 
 /// Sums over the rows of a window, column by column; d is the frame minus the followed frame.

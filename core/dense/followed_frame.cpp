@@ -12,7 +12,7 @@
 namespace slsd {
 namespace {
 
-using enum FollowedFrame::Unknown;
+using enum Fitted::Unknown;
 constexpr float kOfSlopeUnit = 1.F / 16;  // relative to the field's unit: slopes along a line are no multiples of it
 
 /// Sums of the derivatives' products.
@@ -177,7 +177,7 @@ inline __attribute__((always_inline)) void invert_eight(EightNormals& normals) {
 }
 
 void put_normal(const Moments& of, int lane, EightNormals& to) {
-  const auto set = [&](FollowedFrame::Unknown i, FollowedFrame::Unknown j, float value) {
+  const auto set = [&](Fitted::Unknown i, Fitted::Unknown j, float value) {
     to.of[i][j][lane] = to.of[j][i][lane] = value;
   };
   set(kOffset, kOffset, of.plain[kOne]), set(kOffset, kGain, of.plain[kP]), set(kOffset, kGainX, of.by_x[kP]);
@@ -286,7 +286,7 @@ void FollowedFrame::find_inverses(const DenseFrame& frame, const SurfaceGrid& gr
       Cloned<sum_moments>::call(columns.data() + static_cast<std::ptrdiff_t>(kNormalLanes * kLanes) * (x - half),
                                 window_px, moments);
       put_normal(moments, lanes, normals);
-      const AlignPriors priors =
+      const AlignPriors<float> priors =
           align_priors(SurfaceGrid::kAlign, frame.noise.at(node.offset + 0.5F * node.gain), node.gain);
       normals.of[kAcross][kAcross][lanes] += priors.across;
       normals.of[kGainX][kGainX][lanes] += priors.gain_slope, normals.of[kGainY][kGainY][lanes] += priors.gain_slope;

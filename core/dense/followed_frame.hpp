@@ -36,8 +36,7 @@ struct FollowedFrame {
   /// Finds `inverses` from these.
   void find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, int window_px, Executor& executor);
 
-  /// The unknowns in the order of their sums; the size of an upper triangle; and the light of one unit.
-  enum Unknown { kOffset, kGain, kGainX, kGainY, kAcross, kSlopeX, kSlopeY, kDisparity };
+  /// The size of an upper triangle; and the light of one unit.
   static constexpr int kPacked = kFitted * (kFitted + 1) / 2;
   static constexpr float kLightUnit = 1.F / 16384;
 };

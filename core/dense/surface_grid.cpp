@@ -7,9 +7,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "core/clones.hpp"
 #include "core/geometry/robust.hpp"
-#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -34,9 +32,6 @@ constexpr float kLeastPx = 0.003F, kOfScatter = 0.8F;
 
 /// Numbers of seeds for the epipolar offset: at most, at least for its middle, and at least for its slopes.
 constexpr std::size_t kOffsetSeeds = 256, kOffsetSeedsLeast = 8, kOffsetSlopeSeeds = 48;
-/// Usual offset across the epipolar lines. A larger one suggests an equal error along the lines, which changes depth:
-/// the excess adds to sigma.
-constexpr float kUsualOffsetPx = 0.2F;
 constexpr float kOffsetPx = 0.05F;  // scatter of a seed's offset from relief and noise
 /// Half side of a square that contains any pattern.
 constexpr float kEverywherePx = 1e6F;
@@ -231,7 +226,7 @@ void SurfaceGrid::offer(const Attempt& attempt) {
   next_.push_back(attempt);
 }
 
-void SurfaceGrid::offer_neighbours(std::int32_t index) {
+void SurfaceGrid::offer_neighbours(std::int32_t index, int step) {
   const SurfaceNode& node = nodes_[index];
   const int column = index % columns_, row = index / columns_;
   const auto stride = static_cast<float>(options_.stride_px);
@@ -249,7 +244,7 @@ void SurfaceGrid::offer_neighbours(std::int32_t index) {
            node.gain_y,
            node.offset});
   };
-  to(1, 0), to(-1, 0), to(0, 1), to(0, -1);
+  to(step, 0), to(-step, 0), to(0, step), to(0, -step);
 }
 
 void SurfaceGrid::clear() {
@@ -259,35 +254,66 @@ void SurfaceGrid::clear() {
   attempts_.assign(count, 0);
 }
 
-void SurfaceGrid::offer_seeds(std::span<const SurfaceSeed> seeds) {
+void SurfaceGrid::offer_seed(std::int32_t index, const SurfaceSeed& seed) {
+  if (index < 0) return;
+  const float dx = static_cast<float>(x_of(index % columns_)) - seed.camera_px.x(),
+              dy = static_cast<float>(y_of(index / columns_)) - seed.camera_px.y();
+  offer({index, 0, {seed.plane.at(dx, dy), seed.plane.slope_x, seed.plane.slope_y}, 0, 0, 0, 0, 0});
+}
+
+void SurfaceGrid::forget_attempts() {
+  for (std::uint8_t& attempts : attempts_)
+    if (attempts != kClosed) attempts = 0;
+}
+
+void SurfaceGrid::grow_coarse(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+                              const CoarseLattice& lattice, Executor& executor) {
+  next_.clear();
+  const auto nearest = [&](int node, int count) {
+    const int coarse = static_cast<int>(std::lround(static_cast<double>(node - lattice.first) / lattice.step));
+    return lattice.of(std::clamp(coarse, 0, count - 1));
+  };
   for (const SurfaceSeed& seed : seeds) {
     const std::int32_t index = node_at(seed.camera_px);
     if (index < 0) continue;
-    const float dx = static_cast<float>(x_of(index % columns_)) - seed.camera_px.x(),
-                dy = static_cast<float>(y_of(index / columns_)) - seed.camera_px.y();
-    offer({index, 0, {seed.plane.at(dx, dy), seed.plane.slope_x, seed.plane.slope_y}, 0, 0, 0, 0, 0});
+    offer_seed(nearest(index / columns_, lattice.rows) * columns_ + nearest(index % columns_, lattice.columns), seed);
   }
+  for (int row = 0; row < lattice.rows; ++row)
+    for (int column = 0; column < lattice.columns; ++column)
+      if (const std::int32_t index = lattice.of(row) * columns_ + lattice.of(column); nodes_[index].good)
+        offer_neighbours(index, lattice.step);
+  grow_fronts(frame, field, lattice.step, executor);
+  forget_attempts();
 }
 
 void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                        Executor& executor) {
   next_.clear();
-  offer_seeds(seeds);
+  for (const SurfaceSeed& seed : seeds) offer_seed(node_at(seed.camera_px), seed);
   for (std::size_t i = 0; i < nodes_.size(); ++i)
-    if (nodes_[i].good) offer_neighbours(static_cast<std::int32_t>(i));
-  grow_fronts(frame, field, executor);
+    if (nodes_[i].good) offer_neighbours(static_cast<std::int32_t>(i), 1);
+  grow_fronts(frame, field, 1, executor);
 }
 
 void SurfaceGrid::grow_on(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                           Executor& executor) {
-  for (std::uint8_t& attempts : attempts_)
-    if (attempts != kClosed) attempts = 0;
+  forget_attempts();
   next_.clear();
-  offer_seeds(seeds);
-  grow_fronts(frame, field, executor);
+  for (const SurfaceSeed& seed : seeds) offer_seed(node_at(seed.camera_px), seed);
+  grow_fronts(frame, field, 1, executor);
 }
 
-void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field, Executor& executor) {
+BlockPlaces SurfaceGrid::places_of(int row) const {
+  const Eigen::Vector3d& translation = geometry_->camera.projector_from_camera.translation;
+  return {x_of(0),
+          y_of(row),
+          turned_[static_cast<std::size_t>(row) * columns_].data(),
+          {translation.x(), translation.y(), translation.z()},
+          geometry_->projector,
+          epipolar_};
+}
+
+void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field, int step, Executor& executor) {
   if (batches_.size() < static_cast<std::size_t>(executor.workers())) batches_.resize(executor.workers());
   while (!next_.empty()) {
     front_.swap(next_);
@@ -311,239 +337,9 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field
     });
     for (const Attempt& attempt : front_) pending_[attempt.node] = -1;
     for (std::size_t i = 0; i < front_.size(); ++i) {
-      if (accepted_[i]) offer_neighbours(front_[i].node);
+      if (accepted_[i]) offer_neighbours(front_[i].node, step);
     }
   }
-}
-
-namespace {
-
-/// Reach of a node in fusing, in nodes.
-constexpr int kFuseReach = 2;
-constexpr float kFusePx = 0.015F;  // error of the pattern's model, in each node
-constexpr float kFuseSigmas = 3;
-/// Limits for taking the mean: the scatter of the surrounding nodes over their noise, and a node's move by the bend
-/// over its noise. Beyond them there is relief, and the mean covers fewer nodes.
-constexpr float kFuseExcess = 0.8F, kFlat = 0.7F;
-/// Error that no mean reduces, px: focus and lenses differ slightly from the pattern's modelled blur.
-constexpr float kFloorPx = 0.005F;
-/// Factors of the neighbours' disagreement on a bend. A plane continued by a stride is off by half the bend times the
-/// stride squared. A window's own plane is off by a 24th of the bend times the window squared. So the disagreement
-/// measures the error.
-constexpr float kOfBendLeft = 1.6F, kOfDisagreementLeast = 0.5F, kOfDisagreementMost = 4;
-/// Share of the noise in the squared disagreement that is no relief.
-constexpr float kOfNoise = 0.6F;
-/// Factor of the variance of a mean over that of white noise: edges are uneven within the windows, and correcting bends
-/// adds noise.
-constexpr float kOfMean = 1.45F;
-/// The share of the variance of noise that the mean of nodes leaves: windows of w px each, s px apart, weigh the pixels
-/// along each axis by the sum of their boxes.
-float left_of_variance(int reach, int window_px, int stride_px) {
-  const int nodes = 2 * reach + 1, all = (nodes - 1) * stride_px + window_px;
-  float squares = 0;
-  for (int x = 0; x < all; ++x) {
-    int windows = 0;
-    for (int node = 0; node < nodes; ++node) windows += x >= node * stride_px && x < node * stride_px + window_px;
-    squares += static_cast<float>(windows * windows);
-  }
-  const float along = squares / static_cast<float>(nodes * nodes * window_px);
-  return std::min(1.F, kOfMean * along * along);
-}
-
-/// Factor for the shared errors of adjacent slopes, whose windows overlap: larger for the smaller reach.
-constexpr float kOverlap[kFuseReach] = {9, 3};
-
-/// Correction of a bend on waves of wave number k, which a regression over slopes underestimates. Over n slopes, a
-/// stride s apart, the bend loses the share k^2 s^2 / 6 times r. Here r is the mean fourth power of the slopes' places
-/// over their mean square (1 for three slopes, 3.4 for five). The window w of each slope takes another share, k^2 w^2 /
-/// 40. So three slopes lack kBendBeyond + kWindowBeyond w^2 / s^2 times their difference from five. kBeyondMost limits
-/// this factor: for windows much wider than strides, the series does not hold.
-constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40), kBeyondMost = 1.2F;
-
-/// Inputs of fuse_lanes(): eight nodes of a row and their neighbours, in the order of Around.
-struct Fusing {
-  const float* around[7];
-  std::ptrdiff_t row;  // distance between rows
-  float stride, of_bend, of_disagreement;
-  float beyond;       // factor of the bend correction
-  const float* left;  // for each reach, see left_of_variance()
-};
-enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
-
-/// Results of fuse_lanes(): planes in projector px relative to the nodes' own, the addition to sigma squared, and the
-/// share of sigma squared that remains.
-struct Fused {
-  Lanes off, slope_x, slope_y, left, more;
-};
-
-/// The sums of a regression of slopes by place along an axis.
-struct BendSums {
-  Lanes w, x, xx, s, xs;
-
-  inline __attribute__((always_inline)) void solve(Lanes& bend, Lanes& spread) const {
-    spread = xx - x * x / w;
-    bend = (xs - x * s / w) / spread;
-  }
-};
-
-/// Reduces a bend by the part that noise may cause.
-inline __attribute__((always_inline)) void take_noise_off(float overlap, const Lanes& spread, Lanes& bend) {
-  const Lanes zero{}, sure = (zero + 1) - overlap / (spread * bend * bend);
-  bend = ((spread > zero) & (sure > zero)) ? bend * sure : zero;
-}
-
-// The mean of a node's and its neighbour's slopes continues the neighbour's value exactly over any surface of the
-// second order.
-inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& fused) {
-  const Lanes zero{}, one = zero + 1;
-  Lanes own[7], beside = zero, beside_count = zero;
-  for (int k = 0; k < 7; ++k) load(in.around[k], own[k]);
-  struct Mean {
-    Lanes weights, values, slopes_x, slopes_y, squares, expected, count;
-  };
-  Mean means[kFuseReach];
-  for (Mean& mean : means) mean = {zero, zero, zero, zero, zero, zero, zero};
-  BendSums along[2][kFuseReach];  // both axes
-  for (auto& axis : along)
-    for (BendSums& sums : axis) sums = {zero, zero, zero, zero, zero};
-  const Lanes& px_per = own[kPxPer];
-  const Lanes own_noise = own[kNoisePx] * own[kNoisePx] + kFusePx * kFusePx;
-  for (int dy = -kFuseReach; dy <= kFuseReach; ++dy) {
-    for (int dx = -kFuseReach; dx <= kFuseReach; ++dx) {
-      Lanes other[7];
-      for (int k = 0; k < 7; ++k) load(in.around[k] + dy * in.row + dx, other[k]);
-      const float x = in.stride * static_cast<float>(dx), y = in.stride * static_cast<float>(dy);
-      const Lanes apart = other[kInverseDepth] - own[kInverseDepth];
-      const Lanes off =
-          px_per * (apart - 0.5F * ((other[kSlopeX] + own[kSlopeX]) * x + (other[kSlopeY] + own[kSlopeY]) * y));
-      const Lanes of_slopes = 0.5F * (other[kSlopeNoise] + own[kSlopeNoise]);
-      const Lanes variance = other[kNoisePx] * other[kNoisePx] + of_slopes * of_slopes * (x * x + y * y);
-      const Lanes near = off * off < one ? other[kGood] : zero;
-      if (std::abs(dx) + std::abs(dy) == 1) {
-        const Lanes continued = px_per * (apart - other[kSlopeX] * x - other[kSlopeY] * y);
-        const Lanes by_noise = other[kNoisePx] * other[kNoisePx] + own[kNoisePx] * own[kNoisePx] +
-                               other[kSlopeNoise] * other[kSlopeNoise] * (x * x + y * y);
-        beside += near * (continued * continued - kOfNoise * by_noise), beside_count += near;
-      }
-      const Lanes w = near / (other[kSlopeNoise] * other[kSlopeNoise] + 1e-8F);
-      const auto regress = [&](BendSums & sums, float at, const Lanes& slope) __attribute__((always_inline)) {
-        sums.w += w, sums.x += w * at, sums.xx += w * (at * at), sums.s += w * slope, sums.xs += w * at * slope;
-      };
-      const Lanes steep_x = px_per * other[kSlopeX], steep_y = px_per * other[kSlopeY];
-      const Lanes expected = variance + own_noise;
-      const Lanes taken = off * off <= kFuseSigmas * kFuseSigmas * expected ? other[kGood] : zero;
-      const Lanes weight = taken / (variance + kFusePx * kFusePx);
-      for (int reach = std::max({1, std::abs(dx), std::abs(dy)}); reach <= kFuseReach; ++reach) {
-        regress(along[0][reach - 1], x, steep_x), regress(along[1][reach - 1], y, steep_y);
-        Mean& mean = means[reach - 1];
-        mean.weights += weight, mean.values += weight * off;
-        mean.slopes_x += weight * other[kSlopeX], mean.slopes_y += weight * other[kSlopeY];
-        mean.squares += taken * off * off, mean.expected += taken * expected, mean.count += taken;
-      }
-    }
-  }
-  // A plane fitted to a window lies off a bent surface by half the bend times the mean squared distance from the
-  // window's centre. Widely spaced slopes underestimate short waves more than close ones do; extrapolating from both
-  // removes the loss. If noise hides that, use the bend of the wider regression, which covers long waves.
-  Lanes lift = zero;
-  for (const auto& axis : along) {
-    Lanes near, wide, near_spread, wide_spread;
-    axis[0].solve(near, near_spread), axis[1].solve(wide, wide_spread);
-    near += in.beyond * (near - wide);
-    take_noise_off(kOverlap[0] * (1 + in.beyond) * (1 + in.beyond), near_spread, near);
-    take_noise_off(kOverlap[1], wide_spread, wide);
-    lift += near * near > wide * wide ? near : wide;
-  }
-  lift *= in.of_bend;
-  const Lanes any = beside_count > zero ? one : zero;
-  beside = beside > zero ? beside : zero;
-  fused.more = any * (lift * lift + in.of_disagreement * in.of_disagreement * beside / (beside_count + (one - any)));
-  fused.left = one, fused.off = zero, fused.slope_x = own[kSlopeX], fused.slope_y = own[kSlopeY];
-  for (int reach = 1; reach <= kFuseReach; ++reach) {
-    const Mean& mean = means[reach - 1];
-    const auto all = static_cast<float>((2 * reach + 1) * (2 * reach + 1));
-    const IntLanes holds = (2 * mean.count > zero + all) & (mean.squares < kFuseExcess * kFuseExcess * mean.expected) &
-                           (lift * lift < kFlat * kFlat * own_noise);
-    const Lanes per_weight = one / (mean.weights + 1e-20F);
-    fused.left = holds ? zero + in.left[reach - 1] : fused.left;
-    fused.off = holds ? mean.values * per_weight : fused.off;
-    fused.slope_x = holds ? mean.slopes_x * per_weight : fused.slope_x;
-    fused.slope_y = holds ? mean.slopes_y * per_weight : fused.slope_y;
-  }
-  fused.off -= lift;
-}
-
-}  // namespace
-
-void SurfaceGrid::fuse(Executor& executor) {
-  // The data of all nodes, one quantity after the other, with a border of nodes that are not good.
-  const std::size_t row = static_cast<std::size_t>(columns_) + 2 * kFuseReach + kLanes,
-                    plane = row * (static_cast<std::size_t>(rows_) + 2 * kFuseReach);
-  if (around_.size() != 8 * plane) around_.assign(8 * plane, 0);
-  const auto place = [&](int at_row, int column, int what) {
-    return around_.data() + what * plane + (static_cast<std::size_t>(at_row) + kFuseReach) * row + column + kFuseReach;
-  };
-  executor.run(rows_, [&](int at_row, int) {
-    const SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
-    for (int column = 0; column < columns_; ++column) {
-      const SurfaceNode& node = nodes[column];
-      const float values[7] = {node.plane.inverse_depth,
-                               node.plane.slope_x,
-                               node.plane.slope_y,
-                               1 / node.per_px,
-                               node.noise_px,
-                               node.slope_noise,
-                               1};
-      for (int k = 0; k < 7; ++k) *place(at_row, column, k) = node.good ? values[k] : 0;
-      *place(at_row, column, kVariance) = 0;
-    }
-  });
-  const auto side = static_cast<float>(options_.window_px), stride = static_cast<float>(options_.stride_px);
-  std::array<float, kFuseReach> left;
-  for (int reach = 1; reach <= kFuseReach; ++reach)
-    left[reach - 1] = left_of_variance(reach, options_.window_px, options_.stride_px);
-  executor.run(rows_, [&](int at_row, int) {
-    Fusing fusing{
-        {},
-        static_cast<std::ptrdiff_t>(row),
-        static_cast<float>(options_.stride_px),
-        side * side / 24,
-        std::clamp(kOfBendLeft * side * side / (12 * stride * stride), kOfDisagreementLeast, kOfDisagreementMost),
-        std::min(kBeyondMost, kBendBeyond + kWindowBeyond * side * side / (stride * stride)),
-        left.data()};
-    SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
-    for (int column = 0; column < columns_; column += kLanes) {
-      const int count = std::min(kLanes, columns_ - column);
-      if (std::none_of(nodes + column, nodes + column + count, [](const SurfaceNode& node) { return node.good; }))
-        continue;
-      for (int k = 0; k < 7; ++k) fusing.around[k] = place(at_row, column, k);
-      Fused fused;
-      Cloned<fuse_lanes>::call(fusing, fused);
-      for (int lane = 0; lane < count; ++lane) {
-        SurfaceNode& node = nodes[column + lane];
-        if (!node.good) continue;
-        node.plane.inverse_depth += fused.off[lane] * node.per_px;
-        node.plane.slope_x = fused.slope_x[lane], node.plane.slope_y = fused.slope_y[lane];
-        *place(at_row, column + lane, kVariance) =
-            fused.left[lane] * (node.sigma_px * node.sigma_px + fused.more[lane]);
-      }
-    }
-  });
-  // A node's own variance comes from few numbers and is itself uncertain: average it with those around it.
-  executor.run(rows_, [&](int at_row, int) {
-    SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
-    for (int column = 0; column < columns_; ++column) {
-      if (!nodes[column].good) continue;
-      float sum = 0, count = 0;
-      for (int dy = -2; dy <= 2; ++dy) {
-        const float *variance = place(at_row + dy, column, kVariance), *good = place(at_row + dy, column, kGood);
-        for (int dx = -2; dx <= 2; ++dx) sum += variance[dx], count += good[dx];
-      }
-      const float off = epipolar_.at({static_cast<float>(x_of(column)), static_cast<float>(y_of(at_row))});
-      const float unknown = std::max(0.F, std::abs(off) - kUsualOffsetPx);
-      nodes[column].sigma_px = std::sqrt(sum / count + unknown * unknown + kFloorPx * kFloorPx);
-    }
-  });
 }
 
 }  // namespace slsd

@@ -10,6 +10,7 @@
 
 #include <Eigen/Core>
 
+#include "core/appearance/align_blocks.hpp"
 #include "core/appearance/align_patches.hpp"
 #include "core/appearance/measure_blur.hpp"
 #include "core/executor.hpp"
@@ -47,16 +48,6 @@ struct SurfaceNode {
   bool good = false;
 };
 
-/// Offset of the pattern from its epipolar lines over the frame, projector px: the calibration's error, or a knock.
-struct EpipolarOffset {
-  Eigen::Vector2f middle_px = Eigen::Vector2f::Zero();  ///< middle of the frame
-  float middle = 0, slope_x = 0, slope_y = 0;           ///< offset there, and its change for one camera px
-
-  [[nodiscard]] float at(const Eigen::Vector2f& camera_px) const {
-    return middle + slope_x * (camera_px.x() - middle_px.x()) + slope_y * (camera_px.y() - middle_px.y());
-  }
-};
-
 /// One frame as the dense stages see it.
 struct DenseFrame {
   GreyView pixels;
@@ -74,6 +65,15 @@ struct PatchGeometry {
 
   PatchGeometry(const CalibratedCamera& of_camera, const Lens& of_projector)
       : camera(of_camera), projector(of_projector), rays(of_camera.lens) {}
+};
+
+/// Nodes of a grid that are spaced by several others, from the first whose window lies within the frame.
+struct CoarseLattice {
+  int step = 1;  ///< nodes from one to the next, along both axes
+  int first = 0, columns = 0, rows = 0;
+
+  /// Column or row in the grid.
+  [[nodiscard]] int of(int coarse) const { return first + coarse * step; }
 };
 
 struct GridOptions {
@@ -97,6 +97,7 @@ class SurfaceGrid {
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] int stride_px() const { return options_.stride_px; }
+  [[nodiscard]] int window_px() const { return options_.window_px; }
   [[nodiscard]] int x_of(int column) const { return first_ + column * options_.stride_px; }
   [[nodiscard]] int y_of(int row) const { return first_ + row * options_.stride_px; }
   /// Returns a good node; null outside the grid and if no plane fitted.
@@ -139,6 +140,7 @@ class SurfaceGrid {
     const std::int32_t node = node_at(camera_px);
     return node >= 0 && nodes_[node].good;
   }
+  [[nodiscard]] bool is_closed(std::size_t node) const { return attempts_[node] == kClosed; }
   /// Tells whether the node there is neither good nor closed.
   [[nodiscard]] bool open_at(const Eigen::Vector2f& camera_px) const {
     const std::int32_t node = node_at(camera_px);
@@ -155,6 +157,14 @@ class SurfaceGrid {
   /// Options for aligning nodes: on most objects, light and colour change by some 2 % of the gain for one camera px.
   static constexpr AlignOptions kAlign{.gain_slope_sigma = 0.02F};
 
+  /// Makes a node from a fit, if it is good.
+  [[nodiscard]] bool accept(const PatchTask& task, SurfaceNode& node) const;
+  /// Returns the places of a row's nodes, for fits of a whole row.
+  [[nodiscard]] BlockPlaces places_of(int row) const;
+
+  /// Grows over the nodes of a lattice alone, from the seeds and from its good nodes.
+  void grow_coarse(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+                   const CoarseLattice& lattice, Executor& executor);
   /// Grows from the seeds and from nodes that have become good since clear().
   void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
   /// Continues from more seeds; tries nodes again that failed from elsewhere.
@@ -190,13 +200,13 @@ class SurfaceGrid {
   }
   [[nodiscard]] bool begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const;
   void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const;
-  [[nodiscard]] bool accept(const PatchTask& task, SurfaceNode& node) const;
   std::size_t align_some(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
                          std::size_t first, std::size_t step, Batch& batch);
   void offer(const Attempt& attempt);
-  void offer_seeds(std::span<const SurfaceSeed> seeds);
-  void grow_fronts(const DenseFrame& frame, const PatternField& field, Executor& executor);
-  void offer_neighbours(std::int32_t index);
+  void offer_seed(std::int32_t index, const SurfaceSeed& seed);
+  void forget_attempts();
+  void grow_fronts(const DenseFrame& frame, const PatternField& field, int step, Executor& executor);
+  void offer_neighbours(std::int32_t index, int step);
   [[nodiscard]] std::int32_t node_at(const Eigen::Vector2f& camera_px) const;
 
   const PatchGeometry* geometry_;

@@ -42,12 +42,14 @@ Eigen::Vector2d Lens::project(const Eigen::Vector3d& point) const {
 }
 
 Eigen::Vector2d Lens::distort(const Eigen::Vector2d& normalised) const {
-  const View seen = view(normalised.x(), normalised.y());
+  View<double> seen;
+  view(normalised.x(), normalised.y(), seen);
   return {seen.u, seen.v};
 }
 
 Eigen::Matrix2d Lens::distort_jacobian(const Eigen::Vector2d& normalised) const {
-  const View seen = view(normalised.x(), normalised.y());
+  View<double> seen;
+  view(normalised.x(), normalised.y(), seen);
   Eigen::Matrix2d jacobian;
   jacobian << seen.u_x, seen.u_y, seen.v_x, seen.v_y;
   return jacobian;

@@ -19,21 +19,23 @@ struct Lens {
   std::array<double, 5> distortion{};
 
   /// The pixel of a normalised, undistorted direction, and its derivatives: pixels per unit of the direction.
+  /// @tparam Number  double, or a vector of them
+  template <class Number>
   struct View {
-    double u, v, u_x, u_y, v_x, v_y;
+    Number u, v, u_x, u_y, v_x, v_y;
   };
-  [[nodiscard]] __attribute__((always_inline)) View view(double x, double y) const {
+  template <class Number>
+  __attribute__((always_inline)) void view(const Number& x, const Number& y, View<Number>& to) const {
     const auto& [k1, k2, p1, p2, k3] = distortion;
-    const double r2 = x * x + y * y;
-    const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    const double slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3));
-    const double cross = x * y * slope + 2 * p1 * x + 2 * p2 * y;
-    return {fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx,
-            fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy,
-            fx * (radial + x * x * slope + 2 * p1 * y + 6 * p2 * x),
-            fx * cross,
-            fy * cross,
-            fy * (radial + y * y * slope + 6 * p1 * y + 2 * p2 * x)};
+    const Number r2 = x * x + y * y;
+    const Number radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const Number slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3));
+    const Number cross = x * y * slope + 2 * p1 * x + 2 * p2 * y;
+    to.u = fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + cx;
+    to.v = fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + cy;
+    to.u_x = fx * (radial + x * x * slope + 2 * p1 * y + 6 * p2 * x);
+    to.u_y = fx * cross, to.v_x = fy * cross;
+    to.v_y = fy * (radial + y * y * slope + 6 * p1 * y + 2 * p2 * x);
   }
 
   /// Pixel of a point in this device's frame; the point has z > 0.

@@ -28,7 +28,8 @@ struct Turning {
 
 /// A step of Newton's method from a direction near that of the pixel.
 inline __attribute__((always_inline)) Turning refined(const Lens& lens, double x, double y, double u, double v) {
-  const Lens::View seen = lens.view(x, y);
+  Lens::View<double> seen;
+  lens.view(x, y, seen);
   const double per_area = 1 / (seen.u_x * seen.v_y - seen.u_y * seen.v_x);
   const double xx = seen.v_y * per_area, xy = -seen.u_y * per_area, yx = -seen.v_x * per_area, yy = seen.u_x * per_area;
   const double off_u = seen.u - u, off_v = seen.v - v;
