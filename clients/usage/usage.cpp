@@ -108,7 +108,7 @@ std::string unknown_word(const CLI::App& app, const CLI::App& chosen, const std:
 std::string missing_argument(const CLI::App& chosen, const CLI::ParseError& error) {
   for (const CLI::Option* option : chosen.get_options())
     if (option->get_required() && option->count() == 0)
-      return option->get_name(/*positional=*/true) + " is missing: " + option->get_description();
+      return option->get_name(/*positional=*/option->get_positional()) + " is missing: " + option->get_description();
   return error.what();
 }
 

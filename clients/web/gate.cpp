@@ -2,39 +2,13 @@
 // Copyright the slsd authors
 #include "clients/web/gate.hpp"
 
-#include <sys/random.h>
-
 #include <algorithm>
-#include <array>
-#include <cstdint>
-#include <cstdlib>
 #include <utility>
 
 namespace slsd::web {
 namespace {
 
 constexpr std::string_view kBearer = "Bearer ";
-
-/// Compares two texts in constant time, so that timing does not reveal where they differ.
-bool same(std::string_view a, std::string_view b) {
-  unsigned difference = a.size() == b.size() ? 0 : 1;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    difference |=
-        static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[i % std::max<std::size_t>(b.size(), 1)]);
-  return difference == 0 && !b.empty();
-}
-
-std::string random_text() {
-  std::array<unsigned char, 24> bytes{};
-  // This few bytes come whole, or never if the kernel has no random numbers; then nobody may enter.
-  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) std::abort();
-  std::string text;
-  for (const unsigned char byte : bytes) {
-    text += "0123456789abcdef"[byte >> 4U];
-    text += "0123456789abcdef"[byte & 15U];
-  }
-  return text;
-}
 
 std::string lower(std::string_view text) {
   std::string result(text);
@@ -66,10 +40,6 @@ bool is_of_this_origin(const Request& request) {
 }
 
 }  // namespace
-
-Token random_token() {
-  return {random_text(), /*chosen=*/false};
-}
 
 std::optional<Refusal> Gate::check_host(const Request& request) const {
   const std::string name = without_port(request.host);
@@ -109,7 +79,7 @@ bool Gate::knows(const Request& request, Clock::time_point now) {
     if (!pair.starts_with(cookie_name_ + "=")) continue;
     const std::string_view id = pair.substr(cookie_name_.size() + 1);
     for (Known& session : sessions_) {
-      if (!same(session.id, id) || !same(session.key, request.page_key)) continue;
+      if (!same_secret(session.id, id) || !same_secret(session.key, request.page_key)) continue;
       session.used = now;
       return true;
     }
@@ -118,18 +88,18 @@ bool Gate::knows(const Request& request, Clock::time_point now) {
 }
 
 std::optional<Refusal> Gate::check_token(const std::string& address, std::string_view token, Clock::time_point now) {
-  std::erase_if(wrong_, [&](const auto& each) { return now - each.second.back() > kWait; });
-  const auto before = wrong_.find(address);
-  if (before != wrong_.end() && before->second.size() >= kWrongMax)
-    return Refusal{429, "too_many_tokens", "too many wrong tokens: wait half a minute"};
-  if (same(token, token_.text)) {
-    if (before != wrong_.end()) wrong_.erase(before);
-    return std::nullopt;
+  switch (tokens_.check(address, token, now)) {
+    case TokenCheck::Verdict::kRight:
+      return std::nullopt;
+    case TokenCheck::Verdict::kWait:
+      return Refusal{429, "too_many_tokens", "too many wrong tokens: wait half a minute"};
+    case TokenCheck::Verdict::kWrong:
+      break;
   }
-  if (token_.chosen && (before != wrong_.end() || wrong_.size() < kAddressesMax)) wrong_[address].push_back(now);
   return Refusal{401, "wrong_token",
-                 token_.chosen ? "that is not the token of this scanner"
-                               : "that is not the token of this scanner; slsd-web makes a new one whenever it starts"};
+                 tokens_.token().chosen
+                     ? "that is not the token of this scanner"
+                     : "that is not the token of this scanner; slsd-web makes a new one whenever it starts"};
 }
 
 tl::expected<Session, Refusal> Gate::log_in(const std::string& address, std::string_view token, Clock::time_point now) {
@@ -138,7 +108,7 @@ tl::expected<Session, Refusal> Gate::log_in(const std::string& address, std::str
   if (sessions_.size() >= kSessionsMax) {
     sessions_.erase(std::ranges::min_element(sessions_, {}, [](const Known& session) { return session.used; }));
   }
-  const Known& made = sessions_.emplace_back(Known{random_text(), random_text(), now});
+  const Known& made = sessions_.emplace_back(Known{random_secret(), random_secret(), now});
   return Session{cookie_name_ + "=" + made.id + "; HttpOnly; SameSite=Strict; Max-Age=1209600", made.key};
 }
 

@@ -4,25 +4,16 @@
 
 #include <chrono>
 #include <deque>
-#include <map>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "clients/access/token.hpp"
 #include "clients/web/request.hpp"
 
 namespace slsd::web {
-
-/// The secret that admits browsers and scripts.
-struct Token {
-  std::string text;
-  bool chosen = false;  ///< a person chose it: it may be guessed, and remains after this run
-};
-
-/// A token for this run, with 192 random bits from the kernel.
-[[nodiscard]] Token random_token();
 
 /// The secret of a browser that has shown the token. It needs both halves: browsers send the cookie to every port of
 /// this host, but only scripts of this origin know the key.
@@ -37,15 +28,13 @@ struct Session {
 class Gate {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr int kWrongMax = 5;  ///< wrong tokens from one address before it must wait; for chosen tokens
-  static constexpr std::chrono::seconds kWait{30};
   static constexpr std::chrono::hours kSession{24 * 14};  ///< lifetime since its last use
-  static constexpr std::size_t kSessionsMax = 64, kAddressesMax = 1024;
+  static constexpr std::size_t kSessionsMax = 64;
 
   /// @param names        host names of the page, without ports; the addresses that it listens at are always valid
   /// @param cookie_name  different for each port, because browsers do not separate the cookies of ports
   Gate(std::vector<std::string> names, Token token, std::string cookie_name)
-      : names_(std::move(names)), token_(std::move(token)), cookie_name_(std::move(cookie_name)) {}
+      : names_(std::move(names)), cookie_name_(std::move(cookie_name)), tokens_(std::move(token)) {}
 
   [[nodiscard]] std::optional<Refusal> check_host(const Request& request) const;
   /// Judges a request that reads data or acts. @return the refusal, if any
@@ -66,11 +55,10 @@ class Gate {
   [[nodiscard]] bool knows(const Request& request, Clock::time_point now);
 
   std::vector<std::string> names_;
-  Token token_;
   std::string cookie_name_;
-  std::mutex mutex_;
+  std::mutex mutex_;  ///< guards the two below
+  TokenCheck tokens_;
   std::deque<Known> sessions_;
-  std::map<std::string, std::deque<Clock::time_point>> wrong_;  ///< times of recent wrong tokens, by address
 };
 
 }  // namespace slsd::web

@@ -10,8 +10,8 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include "clients/access/cannot_listen.hpp"
 #include "clients/web/connection.hpp"
-#include "clients/web/port_holder.hpp"
 
 namespace slsd::web {
 namespace {
@@ -23,18 +23,6 @@ constexpr std::size_t kWorkers = 48;  // each watcher occupies one while it wait
 constexpr int kConnectionsMax = 500;  // by default a process may have 1024 files
 constexpr int kBacklog = 64;
 constexpr std::chrono::milliseconds kPause{100};
-
-Error cannot_listen(const std::string& address, int port, const error_code& error) {
-  const std::string where = address + ":" + std::to_string(port);
-  if (error == boost::asio::error::address_in_use) {
-    const std::string holder = port_holder(port).value_or("another program");
-    return {ErrorCode::kIo, "the port is in use by " + holder + ": stop it, or choose another port with --port", where};
-  }
-  if (error == boost::asio::error::access_denied)
-    return {ErrorCode::kIo, "only root may listen on ports below 1024: choose another with --port", where};
-  return {ErrorCode::kIo, "cannot listen on this address (" + error.message() + "): choose an address of this machine",
-          where};
-}
 
 class Server final : public HttpServer {
  public:

@@ -8,34 +8,26 @@
 #include <systemd/sd-daemon.h>
 #include <CLI/CLI.hpp>
 
+#include "clients/access/token.hpp"
 #include "clients/usage/usage.hpp"
 #include "clients/web/announcement.hpp"
 #include "clients/web/page_server.hpp"
-#include "drivers/files/file.hpp"
 
 namespace {
 
+using slsd::Token;
 using slsd::web::PageOptions;
-using slsd::web::Token;
 
 constexpr int kOwnPagesBytes = 256 << 10;
-constexpr std::size_t kTokenBytesMin = 16, kTokenBytesMax = 1024;
 
 /// @errors kInvalidArgument: a required token is missing or too short; those of read_file()
-slsd::Result<Token> read_token(const PageOptions& options) {
-  if (options.token_file.empty()) {
-    if (slsd::web::is_loopback(options.listen)) return slsd::web::random_token();
-    return slsd::fail(slsd::ErrorCode::kInvalidArgument,
-                      "beyond loopback, anyone who knows the address could scan: give --token-file a file with a token "
-                      "of 16 characters or more",
-                      options.listen);
-  }
-  auto text = slsd::read_file(options.token_file, kTokenBytesMax);
-  if (!text) return tl::unexpected(text.error());
-  while (!text->empty() && std::isspace(static_cast<unsigned char>(text->back())) != 0) text->pop_back();
-  if (text->size() >= kTokenBytesMin) return Token{std::move(*text), /*chosen=*/true};
-  return slsd::fail(slsd::ErrorCode::kInvalidArgument, "a token must have 16 characters or more",
-                    options.token_file.string());
+slsd::Result<Token> token_of(const PageOptions& options) {
+  if (!options.token_file.empty()) return slsd::read_token(options.token_file);
+  if (slsd::web::is_loopback(options.listen)) return slsd::random_token();
+  return slsd::fail(slsd::ErrorCode::kInvalidArgument,
+                    "beyond loopback, anyone who knows the address could scan: give --token-file a file with a token "
+                    "of 16 characters or more",
+                    options.listen);
 }
 
 std::string address_of(const PageOptions& options, int port) {
@@ -58,7 +50,7 @@ std::string announce(const PageOptions& options, const Token& token, int port) {
 }
 
 slsd::Result<> serve(const PageOptions& options) {
-  const auto token = read_token(options);
+  const auto token = token_of(options);
   if (!token) return tl::unexpected(token.error());
   slsd::web::PageServer server(options, *token);
   if (auto opened = server.open(); !opened) return opened;

@@ -18,14 +18,14 @@ PAGES = {
               "docs/calibration.md": "Calibrating", "docs/page.md": "The page"},
     "Use": {"docs/tasks.md": "Tasks", "docs/configuration.md": "Configuration", "docs/dense.md": "Dense clouds", "docs/formats.md": "File formats",
             "docs/protocol.md": "Protocol", "clients/python/README.md": "Python", "clients/cpp/README.md": "C++",
-            "docs/examples.md": "Examples", "docs/ros.md": "ROS 2", "clients/ros/README.md": "ROS 2 launch file",
+            "docs/examples.md": "Examples", "docs/controllers.md": "Controllers", "docs/ros.md": "ROS 2", "clients/ros/README.md": "ROS 2 launch file",
             "docs/fleet.md": "Many scanners"},
     "Run": {"docs/supervision.md": "Supervision", "docs/metrics.md": "Metrics"},
     "Understand": {"docs/decoder.md": "The decoder", "docs/reasons.md": "Reasons", "docs/alphabet.md": "The alphabet", "docs/arrays.md": "The arrays",
                    "docs/architecture.md": "Architecture", "docs/glossary.md": "Glossary", "docs/developing.md": "Developing",
                    "tests/corpus/README.md": "The corpus", "CHANGELOG.md": "Changes"},
 }
-TEXT_ENDINGS = {".toml", ".hpp", ".cpp", ".py", ""}  # shown as they are
+TEXT_ENDINGS = {".toml", ".hpp", ".cpp", ".c", ".script", ".py", ""}  # shown as they are
 
 
 def pages():

@@ -20,7 +20,7 @@ SOURCE = pathlib.Path(__file__).resolve().parents[2]
 # Whose messages, comments and pages of the manual a user reads.
 NAMING = ("core", "daemon", "drivers", "picture", "clients", "config", "man", "systemd")
 PAGE = re.compile(r"\bdocs/[a-z_-]+\.md\b")
-UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service", "slsd-web.service",
+UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service", "slsd-web.service", "slsd-tcp.service",
          "slsd-metrics.service", "slsd-metrics.timer")
 DDS_UNITS = ("slsd-dds.service", "slsd-dds@.service") if (pathlib.Path(BUILD) / "bin/slsd-dds").exists() else ()
 UNITS += DDS_UNITS
@@ -87,7 +87,7 @@ class Install(unittest.TestCase):
     def test_puts_everything_in_its_place(self):
         install("/usr", str(self.root))
         for file in ("usr/bin/slsd", "usr/bin/slsctl", "usr/bin/slsd-web", "usr/libexec/slsd/slsd-calibrate", "usr/libexec/slsd/slsd-picture",
-                     *(f"usr/lib/systemd/system/{unit}" for unit in UNITS), "usr/share/man/man8/slsd-web.8",
+                     *(f"usr/lib/systemd/system/{unit}" for unit in UNITS), "usr/share/man/man8/slsd-web.8", "usr/bin/slsd-tcp", "usr/share/man/man8/slsd-tcp.8",
                      "usr/lib/sysusers.d/slsd.conf", "usr/lib/systemd/catalog/slsd.catalog", "usr/lib/udev/rules.d/60-slsd.rules",
                      "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",
                      "etc/slsd/patterns/16px-5.toml",
@@ -147,7 +147,7 @@ class Install(unittest.TestCase):
     def test_units_have_few_rights(self):
         self.lay_out_for_systemd()
         for name, highest in (("slsd.service", 1.8), ("slsd@left.service", 1.8), ("slsd-display.service", 3.5),
-                              ("slsd-web.service", 1.5), ("slsd-metrics.service", 2.0), *((unit.replace("@", "@left"), 1.6) for unit in DDS_UNITS)):
+                              ("slsd-web.service", 1.5), ("slsd-tcp.service", 1.5), ("slsd-metrics.service", 2.0), *((unit.replace("@", "@left"), 1.6) for unit in DDS_UNITS)):
             weighed = subprocess.run(["systemd-analyze", "security", "--offline=yes", "--no-pager", f"--root={self.root}", name],
                                      capture_output=True, text=True, check=True).stdout
             exposure = float(re.search(r"Overall exposure level for .*: ([0-9.]+)", weighed).group(1))

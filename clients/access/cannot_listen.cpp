@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/web/port_holder.hpp"
+#include "clients/access/cannot_listen.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <sstream>
+#include <string>
 #include <vector>
 
-namespace slsd::web {
+namespace slsd {
 namespace {
 
 namespace fs = std::filesystem;
@@ -42,8 +45,7 @@ bool has_one_of(const fs::path& process, const std::vector<std::string>& sockets
   return false;
 }
 
-}  // namespace
-
+// The program that listens at the port.
 std::optional<std::string> port_holder(int port) {
   const std::vector<std::string> sockets = listening_sockets(port);
   if (sockets.empty()) return std::nullopt;
@@ -59,4 +61,19 @@ std::optional<std::string> port_holder(int port) {
   return std::nullopt;
 }
 
-}  // namespace slsd::web
+}  // namespace
+
+Error cannot_listen(const std::string& address, int port, const std::error_code& error) {
+  const std::string where = address + ":" + std::to_string(port);
+  // By number: the categories of Asio and Boost differ.
+  if (error.value() == EADDRINUSE) {
+    const std::string holder = port_holder(port).value_or("another program");
+    return {ErrorCode::kIo, "the port is in use by " + holder + ": stop it, or choose another port with --port", where};
+  }
+  if (error.value() == EACCES)
+    return {ErrorCode::kIo, "only root may listen on ports below 1024: choose another with --port", where};
+  return {ErrorCode::kIo, "cannot listen on this address (" + error.message() + "): choose an address of this machine",
+          where};
+}
+
+}  // namespace slsd
