@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <linux/perf_event.h>
+#include <sys/ioctl.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <ctime>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "bench/opencv_anchor.hpp"
+#include "core/calibration_file/calibration_file.hpp"
+#include "core/code/pattern.hpp"
+#include "core/decode/decoder.hpp"
+#include "core/dense/dense_mapper.hpp"
+#include "core/exposure/light_levels.hpp"
+#include "drivers/files/file.hpp"
+#include "drivers/files/read_image.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kLargestFileBytes = 1 << 24;
+constexpr int kCacheLineBytes = 64;
+
+/// A hardware counter of this thread. Machines without one, many virtual ones among them, give no value.
+class HardwareCounter {
+ public:
+  explicit HardwareCounter(std::uint64_t event) {
+    perf_event_attr attributes{};
+    attributes.type = PERF_TYPE_HARDWARE;
+    attributes.size = sizeof attributes;
+    attributes.config = event;
+    attributes.exclude_kernel = 1;
+    file_ = static_cast<int>(syscall(SYS_perf_event_open, &attributes, 0, -1, -1, 0));
+  }
+  HardwareCounter(const HardwareCounter&) = delete;
+  HardwareCounter& operator=(const HardwareCounter&) = delete;
+  ~HardwareCounter() {
+    if (file_ >= 0) close(file_);
+  }
+  [[nodiscard]] std::optional<double> now() const {
+    std::uint64_t value = 0;
+    if (file_ < 0 || read(file_, &value, sizeof value) != sizeof value) return std::nullopt;
+    return static_cast<double>(value);
+  }
+
+ private:
+  int file_;
+};
+
+double ms_of_thread() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
+}
+
+/// Costs of a stage.
+struct Cost {
+  double ms = 0;
+  std::optional<double> instructions, cache_misses;
+};
+
+/// The costs of a frame's stages, one after the other.
+class StageMeter final : public DenseObserver {
+ public:
+  void start() { last_ = read(); }
+  void done(std::size_t stage) {
+    const Cost now = read();
+    costs[stage].ms = now.ms - last_.ms;
+    if (now.instructions) costs[stage].instructions = *now.instructions - *last_.instructions;
+    if (now.cache_misses) costs[stage].cache_misses = *now.cache_misses - *last_.cache_misses;
+    last_ = read();
+  }
+  void stage_done(DenseStage stage) override { done(1 + static_cast<std::size_t>(stage)); }
+
+  std::array<Cost, 1 + kDenseStageCount> costs{};  ///< decode comes first
+
+ private:
+  [[nodiscard]] Cost read() const { return {ms_of_thread(), instructions_.now(), cache_misses_.now()}; }
+  HardwareCounter instructions_{PERF_COUNT_HW_INSTRUCTIONS}, cache_misses_{PERF_COUNT_HW_CACHE_MISSES};
+  Cost last_;
+};
+
+struct Request {
+  std::string frame, pattern, calibration;
+  int stride_px = DenseOptions{}.stride_px, repeat = 15;
+  bool without_anchor = false;
+};
+
+std::string_view name_of(std::size_t stage) {
+  return stage == 0 ? "decode" : to_string(static_cast<DenseStage>(stage - 1));
+}
+
+template <class Number>
+Number median(std::vector<Number> values) {
+  std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2));
+  return values[values.size() / 2];
+}
+
+void print_row(std::string_view name, double least_ms, double median_ms, double anchor_ms, const Cost& last) {
+  const auto millions = [](const std::optional<double>& count, double each) {
+    return count ? fmt::format("{:.1f}", *count * each * 1e-6) : std::string("-");
+  };
+  std::printf("%-12.*s %9.2f %9.2f %9.2f %14s %10s\n", static_cast<int>(name.size()), name.data(), least_ms, median_ms,
+              least_ms / anchor_ms, millions(last.instructions, 1).c_str(),
+              millions(last.cache_misses, kCacheLineBytes).c_str());
+}
+
+Result<> profile(const Request& request) {
+  const auto pattern_text = read_file(request.pattern, kLargestFileBytes);
+  if (!pattern_text) return tl::unexpected(pattern_text.error());
+  const auto pattern = read_pattern(*pattern_text, request.pattern);
+  if (!pattern) return tl::unexpected(pattern.error());
+  const auto calibration_text = read_file(request.calibration, kLargestFileBytes);
+  if (!calibration_text) return tl::unexpected(calibration_text.error());
+  const auto calibration = read_calibration(*calibration_text, request.calibration);
+  if (!calibration) return tl::unexpected(calibration.error());
+  const auto frame = read_image(request.frame);
+  if (!frame) return tl::unexpected(frame.error());
+  DecodeOptions options;
+  options.dense.stride_px = request.stride_px;
+  auto decoder = Decoder::create(*pattern, *calibration, 0, options);
+  if (!decoder) return tl::unexpected(decoder.error());
+  DenseMapper mapper(*pattern, *calibration, 0, options);
+  const GreyView pixels = view(*frame);
+  const double full = guess_full_level(pixels);
+  OpencvAnchor anchor;
+  SerialExecutor executor;
+  StageMeter meter;
+  std::vector<double> anchors, wholes;
+  std::array<std::vector<double>, 1 + kDenseStageCount> stages;
+  std::uint32_t points = 0;
+  for (int i = 0; i <= request.repeat; ++i) {
+    const double before = ms_of_thread();
+    if (const auto* grey = std::get_if<ImageView<std::uint8_t>>(&pixels); grey != nullptr && !request.without_anchor)
+      (void)anchor.run(*grey);
+    const double after = ms_of_thread();
+    meter.start();
+    if (const auto decoded = decoder->decode(pixels, full); !decoded) return tl::unexpected(decoded.error());
+    meter.done(0);
+    points = mapper.measure(pixels, full, decoder->symbols(), executor, &meter).count(DensePixel::kMeasured);
+    if (i == 0) continue;  // fills buffers
+    anchors.push_back(after - before);
+    double whole = 0;
+    for (std::size_t stage = 0; stage < stages.size(); ++stage)
+      stages[stage].push_back(meter.costs[stage].ms), whole += meter.costs[stage].ms;
+    wholes.push_back(whole);
+  }
+  const double anchor_ms = std::ranges::min(anchors);
+  std::printf("%-12s %9s %9s %9s %14s %10s\n", "stage", "least ms", "median", "/ anchor", "M instructions",
+              "MB missed");
+  Cost sum;
+  for (std::size_t stage = 0; stage < stages.size(); ++stage) {
+    const Cost& cost = meter.costs[stage];
+    print_row(name_of(stage), std::ranges::min(stages[stage]), median(stages[stage]), anchor_ms, cost);
+    if (cost.instructions) sum.instructions = sum.instructions.value_or(0) + *cost.instructions;
+    if (cost.cache_misses) sum.cache_misses = sum.cache_misses.value_or(0) + *cost.cache_misses;
+  }
+  print_row("whole", std::ranges::min(wholes), median(wholes), anchor_ms, sum);
+  print_row("anchor", anchor_ms, median(anchors), anchor_ms, {});
+  std::printf("%u points, stride %d px, one core; the least and the median of %d frames\n", points,
+              DenseMapper::stride_px(calibration->cameras[0].lens, options.dense), request.repeat);
+  if (!sum.instructions) std::puts("this machine counts no instructions and no cache misses");
+  return {};
+}
+
+}  // namespace
+}  // namespace slsd
+
+int main(int argc, char** argv) {
+  using namespace slsd;
+  cv::setNumThreads(1);  // the times are those of one core
+  Request request;
+  CLI::App app("Prints what each stage of a dense cloud costs on one core, for a recorded frame.", "slsd-profile");
+  app.add_option("frame", request.frame, "Image file of one camera")->required();
+  app.add_option("--pattern", request.pattern, "Pattern file (default: pattern.toml beside the frame)");
+  app.add_option("--calibration", request.calibration, "Calibration (default: calibration.yml beside the frame)");
+  app.add_option("--stride", request.stride_px, "dense_stride_px")->check(CLI::Range(1, 16))->capture_default_str();
+  app.add_option("--repeat", request.repeat, "Number of frames")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_flag("--no-anchor", request.without_anchor, "Do not measure the anchor; for samplers");
+  CLI11_PARSE(app, argc, argv);
+  const auto beside = std::filesystem::path(request.frame).parent_path();
+  if (request.pattern.empty()) request.pattern = beside / "pattern.toml";
+  if (request.calibration.empty()) request.calibration = beside / "calibration.yml";
+  if (const auto done = profile(request); !done) {
+    std::fprintf(stderr, "slsd-profile: %s\n", to_string(done.error()).c_str());
+    return 1;
+  }
+  return 0;
+}
