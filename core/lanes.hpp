@@ -47,6 +47,15 @@ static inline __attribute__((always_inline)) void load(const T* from, Lanes& to)
   to = __builtin_convertvector(numbers, Lanes);
 }
 
+/// Takes each lane from the lane that `from` names.
+static inline __attribute__((always_inline)) void permute(const Lanes& lanes, const IntLanes& from, Lanes& to) {
+#if defined(__clang__)
+  for (int lane = 0; lane < kLanes; ++lane) to[lane] = lanes[from[lane]];
+#else
+  to = __builtin_shuffle(lanes, from);
+#endif
+}
+
 static inline __attribute__((always_inline)) float sum_of(const Lanes& lanes) {
   using Half [[gnu::vector_size(16)]] = float;
   const Half half =

@@ -3,6 +3,7 @@
 #include "core/dense/clean_map.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdlib>
@@ -10,50 +11,18 @@
 #include <limits>
 #include <utility>
 
-#include <Eigen/Geometry>
-
 #include "core/clones.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
 namespace {
 
-/// Ratio of distances from the projector: a point farther away by more is on another surface.
-constexpr float kBehind = 1.01F;
 /// Growth that has crossed an edge may continue in scraps over a surface that does not exist. A connected area without
 /// a decoded symbol needs this many times more pixels.
 constexpr std::size_t kWithoutSymbol = 20;
 constexpr auto kMeasuredByte = static_cast<std::uint8_t>(DensePixel::kMeasured);
 
-/// Eight pixels of a row, and the projector pixels that light them.
-struct Rays {
-  float turned[3], per_px[3];  // R r of the first pixel, and its change for one px
-  float translation[3];
-  float fx, fy, cx, cy, distortion[5];
-  int width, height;  // size of the projector's image
-};
-
-/// @param to  the projector's pixel, -1 if there is none, and the distance from the projector along its z axis
-inline __attribute__((always_inline)) void find_rays(const Rays& in, const float* depth_mm, std::int32_t* to,
-                                                     float* distance_mm) {
-  const Lanes zero{};
-  Lanes depth, q[3];
-  load(depth_mm, depth);
-  for (int k = 0; k < 3; ++k) q[k] = depth * (in.turned[k] + in.per_px[k] * kLane) + in.translation[k];
-  const Lanes x = q[0] / q[2], y = q[1] / q[2], r2 = x * x + y * y;
-  const float k1 = in.distortion[0], k2 = in.distortion[1], p1 = in.distortion[2], p2 = in.distortion[3],
-              k3 = in.distortion[4];
-  const Lanes radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  const Lanes u = in.fx * (x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x)) + (in.cx + 0.5F),
-              v = in.fy * (y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y) + (in.cy + 0.5F);
-  // NaN is in no range.
-  const IntLanes inside = (u >= zero) & (v >= zero) & (u < zero + static_cast<float>(in.width)) &
-                          (v < zero + static_cast<float>(in.height)) & (q[2] > zero);
-  const Lanes safe_u = inside ? u : zero, safe_v = inside ? v : zero;
-  const IntLanes at = __builtin_convertvector(safe_v, IntLanes) * in.width + __builtin_convertvector(safe_u, IntLanes);
-  const IntLanes found = inside ? at : IntLanes{} - 1;
-  std::memcpy(to, &found, sizeof found), std::memcpy(distance_mm, &q[2], sizeof q[2]);
-}
+constexpr IntLanes kBitOfLane = {1, 2, 4, 8, 16, 32, 64, 128};
 
 /// One bit for each of eight pixels that lie on one surface with their neighbours.
 inline __attribute__((always_inline)) void find_joined(const float* depth_mm, const float* beside_mm,
@@ -63,9 +32,9 @@ inline __attribute__((always_inline)) void find_joined(const float* depth_mm, co
   load(depth_mm, here), load(beside_mm, beside);
   const Lanes off = beside - here, far = off > none ? off : -off;
   const IntLanes near = far <= kDepthJump * here;
-  std::uint64_t bits = 0;
-  for (int lane = 0; lane < kLanes; ++lane) bits |= static_cast<std::uint64_t>(near[lane] & 1) << lane;
-  joined = bits;
+  const auto parts = std::bit_cast<std::array<std::uint64_t, 4>>(near & kBitOfLane);
+  const std::uint64_t all = parts[0] | parts[1] | parts[2] | parts[3];
+  joined = (all | all >> 32U) & 0xffU;
 }
 
 /// The same for a whole row.
@@ -82,13 +51,21 @@ inline __attribute__((always_inline)) void join_row(const float* depth_mm, const
   }
 }
 
-/// One bit for each byte that is zero, or nonzero, of bytes with small values.
+/// One bit for each byte with the wanted value. Bytes are less than 128.
 inline __attribute__((always_inline)) void pack_row(const std::uint8_t* bytes, int count, std::uint8_t wanted,
                                                     std::uint64_t* bits) {
+  constexpr std::uint64_t kOnes = 0x0101010101010101U, kHigh = kOnes << 7U, kGather = 0x0102040810204080U;
   for (int first = 0; first < count; first += 64) {
     std::uint64_t word = 0;
     const int end = std::min(64, count - first);
-    for (int x = 0; x < end; ++x) word |= static_cast<std::uint64_t>(bytes[first + x] == wanted) << x;
+    int x = 0;
+    for (; x + 8 <= end; x += 8) {
+      std::uint64_t eight;
+      std::memcpy(&eight, bytes + first + x, sizeof eight);
+      const std::uint64_t other = ((eight ^ kOnes * wanted) + (kHigh - kOnes)) & kHigh;
+      word |= ((other ^ kHigh) >> 7U) * kGather >> 56U << x;
+    }
+    for (; x < end; ++x) word |= static_cast<std::uint64_t>(bytes[first + x] == wanted) << x;
     bits[first / 64] = word;
   }
 }
@@ -146,58 +123,6 @@ void for_each_bit(const std::uint64_t* row, std::size_t words, const Take& take)
 }
 
 }  // namespace
-
-MapCleaner::MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays)
-    : camera_(camera), projector_(projector), rays_(std::move(rays)) {}
-
-void MapCleaner::drop_occluded(DenseMap& map, Executor& executor) {
-  label_.resize(map.depth_mm.size());
-  distance_.resize(map.depth_mm.size());
-  nearest_.assign(static_cast<std::size_t>(projector_.width_px) * projector_.height_px,
-                  std::numeric_limits<float>::max());
-  const auto& [rotation, translation] = camera_.projector_from_camera;
-  const Eigen::Matrix3f turn = rotation.cast<float>();
-  Rays rays{};
-  Eigen::Map<Eigen::Vector3f>(rays.translation) = translation.cast<float>();
-  rays.fx = static_cast<float>(projector_.fx), rays.fy = static_cast<float>(projector_.fy);
-  rays.cx = static_cast<float>(projector_.cx), rays.cy = static_cast<float>(projector_.cy);
-  for (int k = 0; k < 5; ++k) rays.distortion[k] = static_cast<float>(projector_.distortion[k]);
-  rays.width = projector_.width_px, rays.height = projector_.height_px;
-  executor.run(map.height, [&](int y, int) {
-    Rays here = rays;
-    for (int x = 0; x < map.width; x += kLanes) {
-      const Eigen::Vector2f first = rays_->at(x, y), last = rays_->before_next(x, y);
-      Eigen::Map<Eigen::Vector3f>(here.turned) = turn * first.homogeneous();
-      Eigen::Map<Eigen::Vector3f>(here.per_px) = turn.leftCols<2>() * (last - first) / (RayGrid::kPitchPx - 1);
-      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
-      if (x + kLanes <= map.width) {
-        Cloned<find_rays>::call(here, map.depth_mm.data() + pixel, label_.data() + pixel, distance_.data() + pixel);
-        continue;
-      }
-      float depth[kLanes], distance[kLanes];
-      std::int32_t at[kLanes];
-      const int count = map.width - x;
-      std::fill(depth, depth + kLanes, std::numeric_limits<float>::quiet_NaN());
-      std::copy_n(map.depth_mm.data() + pixel, count, depth);
-      Cloned<find_rays>::call(here, depth, at, distance);
-      std::copy_n(at, count, label_.data() + pixel), std::copy_n(distance, count, distance_.data() + pixel);
-    }
-  });
-  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel) {
-    if (label_[pixel] < 0) continue;
-    float& nearest = nearest_[label_[pixel]];
-    nearest = std::min(nearest, distance_[pixel]);
-  }
-  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel) {
-    if (label_[pixel] >= 0 && distance_[pixel] > kBehind * nearest_[label_[pixel]])
-      map.drop(pixel, DensePixel::kOccluded);
-  }
-}
-
-void MapCleaner::drop_beyond_the_light(DenseMap& map) {
-  for (std::size_t pixel = 0; pixel < label_.size(); ++pixel)
-    if (label_[pixel] < 0 && map.measured(pixel)) map.drop(pixel, DensePixel::kUnlit);
-}
 
 void MapCleaner::drop_unlit_boundaries(DenseMap& map, int reach_px) {
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
@@ -310,8 +235,7 @@ void MapCleaner::drop_small_components(DenseMap& map, std::size_t least, std::sp
 
 std::size_t MapCleaner::bytes() const {
   const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
-  return of(label_) + of(runs_) + of(first_runs_) + of(bits_) + of(rows_) + of(measured_) + of(right_) + of(below_) +
-         of(holes_) + of(distance_) + of(nearest_);
+  return of(runs_) + of(first_runs_) + of(bits_) + of(rows_) + of(measured_) + of(right_) + of(below_) + of(holes_);
 }
 
 /// Finds holes of at most so many pixels that lie inside one surface. They are print or dust, as no object so small can

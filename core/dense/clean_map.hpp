@@ -5,15 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <memory>
 #include <span>
 #include <vector>
 
 #include "core/dense/dense_map.hpp"
-#include "core/dense/ray_grid.hpp"
 #include "core/dense/surface_grid.hpp"
-#include "core/executor.hpp"
-#include "core/geometry/calibration.hpp"
 
 namespace slsd {
 
@@ -21,13 +17,6 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers
 class MapCleaner {
  public:
-  MapCleaner(const CalibratedCamera& camera, const Lens& projector, std::shared_ptr<const RayGrid> rays);
-
-  /// Drops points that lie behind another surface on their projector ray: a projector pixel lights one point only.
-  void drop_occluded(DenseMap& map, Executor& executor);
-  /// Drops points outside the projector's image. These drops make no edges, so this comes last. Needs the map that
-  /// drop_occluded() has seen.
-  void drop_beyond_the_light(DenseMap& map);
   /// Drops unlit pixels at boundaries: where the pattern is dark, a surface looks like a shadow. A pixel stays if firm
   /// ones enclose it, that is within their closing (dilation, then erosion by the same radius).
   void drop_unlit_boundaries(DenseMap& map, int reach_px);
@@ -39,9 +28,6 @@ class MapCleaner {
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
  private:
-  CalibratedCamera camera_;
-  Lens projector_;
-  std::shared_ptr<const RayGrid> rays_;  // shared by all copies
   /// A connected run of pixels in a row.
   struct Run {
     int y, first, end;
@@ -57,11 +43,9 @@ class MapCleaner {
   void find_joined(const DenseMap& map);
   void find_small_holes(const DenseMap& map, std::size_t most);
 
-  std::vector<std::int32_t> label_;
   std::vector<Run> runs_;
   std::vector<std::size_t> first_runs_;  // start of each row's runs, and the end of the last
   std::vector<std::uint64_t> bits_, rows_, measured_, right_, below_, holes_;
-  std::vector<float> distance_, nearest_;
 };
 
 }  // namespace slsd

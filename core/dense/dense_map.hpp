@@ -48,18 +48,17 @@ struct DenseMap {
     const std::size_t count = static_cast<std::size_t>(width) * height;
     depth_mm.resize(count), sigma_mm.resize(count), intensity.resize(count), pixels.resize(count), firm.resize(count);
   }
-  /// Clears these rows: nothing is measured there. @param end one past the last row
-  void clear_rows(int first, int end) {
-    const auto clear = [&](auto& values, auto none) {
-      std::fill(values.begin() + static_cast<std::ptrdiff_t>(first) * width,
-                values.begin() + static_cast<std::ptrdiff_t>(end) * width, none);
+  /// Clears pixels: nothing is measured there.
+  void clear(std::size_t first, int count) {
+    const auto fill = [&](auto& values, auto none) {
+      std::fill_n(values.begin() + static_cast<std::ptrdiff_t>(first), count, none);
     };
-    clear(depth_mm, std::numeric_limits<float>::quiet_NaN()), clear(sigma_mm, std::numeric_limits<float>::quiet_NaN());
-    clear(intensity, std::uint8_t{0}), clear(pixels, DensePixel::kNotReached), clear(firm, std::uint8_t{0});
+    fill(depth_mm, std::numeric_limits<float>::quiet_NaN()), fill(sigma_mm, std::numeric_limits<float>::quiet_NaN());
+    fill(intensity, std::uint8_t{0}), fill(pixels, DensePixel::kNotReached), fill(firm, std::uint8_t{0});
   }
   void reset(int to_width, int to_height) {
     resize(to_width, to_height);
-    clear_rows(0, height);
+    clear(0, width * height);
   }
   [[nodiscard]] std::size_t bytes() const {
     return depth_mm.capacity() * sizeof(float) + sigma_mm.capacity() * sizeof(float) + intensity.capacity() +

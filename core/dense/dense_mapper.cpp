@@ -77,7 +77,7 @@ DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
       search_(fixed_->letters, fixed_->window_px),
       follower_(refiner_.window_px()),
       judge_({fixed_->reach_px, fixed_->window_px, fixed_->decode.depth_min_mm, fixed_->decode.depth_max_mm}),
-      cleaner_(fixed_->geometry.camera, fixed_->geometry.projector, fixed_->rays) {}
+      occlusion_(fixed_->geometry.camera, fixed_->geometry.projector, fixed_->rays) {}
 
 DenseMapper DenseMapper::another() const {
   DenseMapper other(fixed_);
@@ -94,7 +94,7 @@ int DenseMapper::window_px() const {
 }
 
 std::size_t DenseMapper::bytes() const {
-  return grid_.bytes() + refiner_.bytes() + follower_.bytes() + cleaner_.bytes() + map_.bytes();
+  return grid_.bytes() + refiner_.bytes() + follower_.bytes() + occlusion_.bytes() + cleaner_.bytes() + map_.bytes();
 }
 
 std::size_t DenseMapper::bytes_of_fields(const Lens& projector) {
@@ -198,12 +198,12 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   done(DenseStage::kFuse);
   judge_.judge(seen, field, grid_, map_, executor);
   done(DenseStage::kJudge);
-  cleaner_.drop_occluded(map_, executor);
+  occlusion_.drop_occluded(map_, executor);
   cleaner_.drop_unlit_boundaries(map_, fixed_->close_px);
   const std::size_t patch = static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px;
   cleaner_.drop_small_components(map_, patch, seeds_);
   cleaner_.prune(map_, fixed_->decode.dense.prune_px, patch);
-  cleaner_.drop_beyond_the_light(map_);
+  occlusion_.drop_beyond_the_light(map_);
   if (!tone_.is_straight()) {
     const auto levels = tone_.levels_of_lights();
     for (std::uint8_t& intensity : map_.intensity) intensity = levels[intensity];

@@ -13,6 +13,7 @@
 #include "core/dense/clean_map.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/follow_grid.hpp"
+#include "core/dense/occlusion.hpp"
 #include "core/dense/pixel_judge.hpp"
 #include "core/dense/refine_grid.hpp"
 #include "core/dense/search_surface.hpp"
@@ -104,6 +105,7 @@ class DenseMapper {
   std::size_t followed_ = 0;  // nodes taken over in the last frame
   float across_px_ = 0;       // their mean move across the epipolar lines
   PixelJudge judge_;
+  Occlusion occlusion_;
   MapCleaner cleaner_;
   std::vector<SurfaceSeed> seeds_;
   ToneCurve tone_;

@@ -15,10 +15,6 @@
 namespace slsd {
 namespace {
 
-/// Largest difference between the planes of adjacent nodes for blending, px, and in standard deviations.
-constexpr float kAgreePx = 0.12F, kAgreeSigmas = 4;
-/// Share of a node's window that agrees, above which the rest counts as noise.
-constexpr float kCleanSupport = 0.9F;
 /// Limits of the evidence around a pixel, natural logarithms: how much likelier the surface has to be than another, or
 /// none. Blur makes neighbours alike, some three pixels to an independent one, so this is a chance of one in a
 /// thousand.
@@ -148,39 +144,66 @@ inline __attribute__((always_inline)) void split_sides(const AroundSums& in, con
              corner(in.right, kLower)};
 }
 
+/// Sums of evidence over columns: of the rows around a row, without it, and of that row itself.
+struct ColumnSums {
+  static constexpr int kRows = 4;  // whole height, upper and lower half with the own row, and the own row
+  const float* rows[kRows];        // two numbers for each column
+
+  /// Adds a column.
+  inline __attribute__((always_inline)) void add(int x, Lanes& total) const {
+    Lanes column;
+    for (int k = 0; k < kRows; ++k) std::memcpy(reinterpret_cast<char*>(&column) + 8 * k, rows[k] + 2 * x, 8);
+    total += column;
+  }
+};
+
+/// Sums rows of evidence above and below a row. @param sums  three buffers of `pitch` numbers
+inline __attribute__((always_inline)) void sum_columns(const float* evidence, std::ptrdiff_t row, int reach, int pitch,
+                                                       float* sums) {
+  for (int first = 0; first < pitch; first += kLanes) {
+    const float* from = evidence + first;
+    Lanes above{}, own, below{};
+    for (int j = 0; j < reach; ++j, from += row) {
+      Lanes more;
+      load(from, more);
+      above += more;
+    }
+    load(from, own);
+    for (int j = 0; j < reach; ++j) {
+      Lanes more;
+      load(from += row, more);
+      below += more;
+    }
+    const Lanes upper = above + own, whole = upper + below, lower = own + below;
+    std::memcpy(sums + first, &whole, sizeof whole), std::memcpy(sums + pitch + first, &upper, sizeof upper);
+    std::memcpy(sums + 2 * static_cast<std::ptrdiff_t>(pitch) + first, &lower, sizeof lower);
+  }
+}
+
 /// Finds the least evidence around each pixel of a cell: of the whole surroundings, and of the half on each side. The
 /// pixel's own line is in both halves. A surface that continues on one side alone ends here, or earlier.
-/// @param evidence  two numbers for each of side x side pixels
-/// @param columns   buffer for 8 (side + 1) numbers
+/// @param evidence  two numbers for each of side x side pixels, and some more
+/// @param buffer    for 8 (side + 1) numbers, and for 6 (side + 4)
 /// @param sides     one for each pixel of the cell; null if not needed
-inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const float* evidence, float* columns,
+inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const float* evidence, float* buffer,
                                                      float* least, float* own, SideEvidence* sides) {
-  const int side = in.side, reach = in.reach;
+  const int side = in.side, reach = in.reach, pitch = (2 * side + kLanes - 1) / kLanes * kLanes;
+  float* const sums = buffer + 8 * static_cast<std::ptrdiff_t>(side + 1);
   for (int y = 0; y < in.cell; ++y) {
-    // Sums over columns, of the whole, of its upper and lower half, and of the row itself, then added along the row.
+    const float* const rows = evidence + 2 * static_cast<std::ptrdiff_t>(y) * side;
+    sum_columns(rows, 2 * static_cast<std::ptrdiff_t>(side), reach, pitch, sums);
+    const ColumnSums columns{{sums, sums + pitch, sums + 2 * static_cast<std::ptrdiff_t>(pitch),
+                              rows + 2 * static_cast<std::ptrdiff_t>(reach) * side}};
     Lanes total{};
-    std::memcpy(columns, &total, sizeof total);
+    std::memcpy(buffer, &total, sizeof total);
     for (int x = 0; x < side; ++x) {
-      const float* at = evidence + 2 * (y * side + x);
-      float above[2] = {0, 0}, below[2] = {0, 0};
-      for (int j = 0; j < reach; ++j) above[0] += at[2 * j * side], above[1] += at[2 * j * side + 1];
-      at += 2 * reach * side;
-      for (int j = 1; j <= reach; ++j) below[0] += at[2 * j * side], below[1] += at[2 * j * side + 1];
-      const Lanes column = {above[0] + at[0] + below[0],
-                            above[1] + at[1] + below[1],
-                            above[0] + at[0],
-                            above[1] + at[1],
-                            at[0] + below[0],
-                            at[1] + below[1],
-                            at[0],
-                            at[1]};
-      total += column;
-      std::memcpy(columns + 8 * (x + 1), &total, sizeof total);
+      columns.add(x, total);
+      std::memcpy(buffer + 8 * (x + 1), &total, sizeof total);
     }
     for (int x = 0; x < in.cell; ++x) {
       Lanes from, before, behind, to;
-      load(columns + 8 * x, from), load(columns + 8 * (x + reach), before);
-      load(columns + 8 * (x + reach + 1), behind), load(columns + 8 * (x + 2 * reach + 1), to);
+      load(buffer + 8 * x, from), load(buffer + 8 * (x + reach), before);
+      load(buffer + 8 * (x + reach + 1), behind), load(buffer + 8 * (x + 2 * reach + 1), to);
       const Lanes all = to - from, left = behind - from, right = to - before;
       const float whole = std::min(all[0], all[1]);
       const float halves = std::min(std::min(std::min(all[2], all[3]), std::min(all[4], all[5])),
@@ -192,45 +215,6 @@ inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const fl
         split_sides({all, left, right, behind - before}, {here[0], here[1]}, sides[y * in.cell + x]);
     }
   }
-}
-
-/// Blend of the planes of four nodes that are one surface.
-struct Blending {
-  float value[4], slope_x[4], slope_y[4];  // inverse depth at the cell's first pixel
-  float sigma_px[4], light[4];
-  float per_px, per_stride, of_full;
-  int first_x, first_y;  // first pixel of the cell, relative to that of its first node
-};
-
-/// Blends a row of pixels.
-inline __attribute__((always_inline)) void blend_lanes(const Blending& in, int row, int first, float* depth,
-                                                       float* sigma, std::int32_t* light) {
-  const Lanes x = kLane + static_cast<float>(in.first_x + first);
-  const auto y = static_cast<float>(in.first_y + row);
-  const Lanes fx = x * in.per_stride;
-  const float fy = y * in.per_stride;
-  Lanes sums[3];
-  for (int side = 0; side < 2; ++side) {
-    const int a = side, b = side + 2;
-    const auto mix = [&](float above, float below) { return above + fy * (below - above); };
-    const Lanes value =
-        mix(in.value[a] + y * in.slope_y[a], in.value[b] + y * in.slope_y[b]) + x * mix(in.slope_x[a], in.slope_x[b]);
-    const float sigma_px = mix(in.sigma_px[a], in.sigma_px[b]), grey = mix(in.light[a], in.light[b]);
-    if (side == 0) {
-      sums[0] = (1 - fx) * value, sums[1] = (1 - fx) * sigma_px, sums[2] = (1 - fx) * grey;
-    } else {
-      sums[0] += fx * value, sums[1] += fx * sigma_px, sums[2] += fx * grey;
-    }
-  }
-  const Lanes mm = 1 / sums[0];
-  const Lanes sigma_mm = in.per_px * mm * mm * sums[1];
-  const Lanes least = Lanes{} + 1, most = Lanes{} + 255;
-  Lanes of_light = sums[2] * in.of_full;
-  of_light = of_light > least ? of_light : least;
-  of_light = of_light < most ? of_light : most;
-  const IntLanes level = __builtin_convertvector(of_light, IntLanes);
-  std::memcpy(depth, &mm, sizeof mm), std::memcpy(sigma, &sigma_mm, sizeof sigma_mm);
-  std::memcpy(light, &level, sizeof level);
 }
 
 }  // namespace
@@ -278,21 +262,6 @@ struct PixelJudge::Cell {
       }
     }
   }
-  /// Tells whether the nodes at the corners are one surface.
-  [[nodiscard]] bool one_surface() const {
-    if (count != 4) return false;
-    const float x = 0.5F * static_cast<float>(left + right - 1), y = 0.5F * static_cast<float>(top + bottom - 1);
-    float least = 1, most = 0, noise = 0;
-    for (int k = 0; k < 4; ++k) {
-      least = std::min(least, value(k, x, y)), most = std::max(most, value(k, x, y));
-      noise = std::max(noise, candidates[k]->noise_px);
-    }
-    return (most - least) / candidates[0]->per_px < kAgreePx + kAgreeSigmas * noise;
-  }
-  [[nodiscard]] bool clean() const {
-    return std::all_of(candidates.begin(), candidates.begin() + 4,
-                       [](const SurfaceNode* node) { return node->support >= kCleanSupport; });
-  }
   /// The mean of the corners, as a node at the first corner.
   [[nodiscard]] SurfaceNode merged() const {
     SurfaceNode node = *candidates[0];
@@ -311,51 +280,6 @@ struct PixelJudge::Cell {
   }
   [[nodiscard]] std::size_t pixel(int x, int y) const { return static_cast<std::size_t>(y) * map.width + x; }
 };
-
-void PixelJudge::blend(const Cell& cell, const float* least, const float* own) const {
-  Blending blending;
-  const int node_x = static_cast<int>(cell.places[0].x()), node_y = static_cast<int>(cell.places[0].y());
-  for (int k = 0; k < 4; ++k) {
-    const SurfaceNode& node = *cell.candidates[k];
-    blending.value[k] = cell.value(k, cell.places[0].x(), cell.places[0].y());
-    blending.slope_x[k] = node.plane.slope_x, blending.slope_y[k] = node.plane.slope_y;
-    blending.sigma_px[k] = node.sigma_px, blending.light[k] = node.gain + node.offset;
-  }
-  const int stride = cell.grid.stride_px();
-  blending.per_px = cell.candidates[0]->per_px, blending.per_stride = 1 / static_cast<float>(stride);
-  blending.of_full = static_cast<float>(255 / cell.frame.full);
-  blending.first_x = cell.left - node_x, blending.first_y = cell.top - node_y;
-  const auto depth_min = static_cast<float>(options_.depth_min_mm),
-             depth_max = static_cast<float>(options_.depth_max_mm);
-  for (int y = cell.top; y < cell.bottom; ++y) {
-    for (int x = cell.left; x < cell.right; x += kLanes) {
-      float depth[kLanes], sigma[kLanes];
-      std::int32_t light[kLanes];
-      Cloned<blend_lanes>::call(blending, y - cell.top, x - cell.left, depth, sigma, light);
-      const int count = std::min(kLanes, cell.right - x);
-      for (int i = 0; i < count; ++i) {
-        const std::size_t pixel = cell.pixel(x + i, y);
-        bool firm = true;
-        if (least != nullptr) {
-          const int at = (y - cell.top) * stride + x + i - cell.left;
-          if (least[at] < kEnclosedMin) {
-            cell.map.pixels[pixel] = DensePixel::kNoSupport;
-            continue;
-          }
-          firm = own[at] > kFirmMin;
-        }
-        if (!(depth[i] >= depth_min && depth[i] <= depth_max)) {
-          cell.map.pixels[pixel] = DensePixel::kOutOfDepthRange;
-          continue;
-        }
-        cell.map.depth_mm[pixel] = depth[i], cell.map.sigma_mm[pixel] = sigma[i];
-        cell.map.intensity[pixel] = static_cast<std::uint8_t>(light[i]);
-        cell.map.pixels[pixel] = DensePixel::kMeasured;
-        cell.map.firm[pixel] = firm;
-      }
-    }
-  }
-}
 
 /// Reads the pixels in and around the cell; -1 for pixels outside the frame.
 void PixelJudge::see(const Cell& cell, Scratch& scratch) const {
@@ -501,16 +425,26 @@ void PixelJudge::choose(const Cell& cell, const Scratch& scratch) const {
   }
 }
 
-void PixelJudge::judge_cell(Cell& cell, Scratch& scratch) const {
+/// Drops pixels of a blended cell that the frame contradicts.
+void PixelJudge::review(Cell& cell, Scratch& scratch) const {
   const int c = cell.column, r = cell.row;
   cell.add(c, r), cell.add(c + 1, r), cell.add(c, r + 1), cell.add(c + 1, r + 1);
-  if (cell.one_surface()) {
-    if (cell.clean()) return blend(cell, nullptr, nullptr);
-    see(cell, scratch);
-    weigh(cell, cell.merged(), 0, -1, scratch);
-    return blend(cell, scratch.least[0].data(), scratch.own[0].data());
+  see(cell, scratch);
+  weigh(cell, cell.merged(), 0, -1, scratch);
+  const int stride = cell.grid.stride_px();
+  for (int y = cell.top; y < cell.bottom; ++y) {
+    for (int x = cell.left; x < cell.right; ++x) {
+      const int at = (y - cell.top) * stride + x - cell.left;
+      const std::size_t pixel = cell.pixel(x, y);
+      const bool supported = scratch.least[0][at] >= kEnclosedMin;
+      if (!supported) cell.map.drop(pixel, DensePixel::kNoSupport);
+      cell.map.firm[pixel] = supported && cell.map.measured(pixel) && scratch.own[0][at] > kFirmMin;
+    }
   }
-  cell.count = 0;
+}
+
+void PixelJudge::judge_cell(Cell& cell, Scratch& scratch) const {
+  const int c = cell.column, r = cell.row;
   for (const auto& [dx, dy] :
        {std::pair(0, 0), {1, 0}, {0, 1}, {1, 1}, {-1, 0}, {2, 0}, {0, -1}, {0, 2}, {-1, 1}, {2, 1}, {1, -1}, {1, 2}}) {
     cell.add_other(c + dx, r + dy, options_.window_px);
@@ -521,7 +455,8 @@ void PixelJudge::judge_cell(Cell& cell, Scratch& scratch) const {
   choose(cell, scratch);
 }
 
-void PixelJudge::resize(int stride_px, int workers) {
+void PixelJudge::resize(const SurfaceGrid& grid, int workers) {
+  const int stride_px = grid.stride_px();
   const int side = stride_px + 2 * options_.reach_px;
   const auto area = static_cast<std::size_t>((side * side + kLanes - 1) / kLanes * kLanes);
   if (side != side_) {
@@ -531,9 +466,9 @@ void PixelJudge::resize(int stride_px, int workers) {
     scratch_.clear();
   }
   while (scratch_.size() < static_cast<std::size_t>(workers)) {
-    Scratch& scratch = scratch_.emplace_back();
-    scratch.seen.assign(area, -1), scratch.evidence.assign(2 * area, 0);
-    scratch.sums.assign(8 * static_cast<std::size_t>(side + 1), 0);
+    Scratch& scratch = scratch_.emplace_back(CellBlender(grid, options_.depth_min_mm, options_.depth_max_mm));
+    scratch.seen.assign(area, -1), scratch.evidence.assign(2 * area + kLanes, 0);
+    scratch.sums.assign(14 * static_cast<std::size_t>(side + 4), 0);
     for (int k = 0; k < kCandidates; ++k) {
       scratch.least[k].assign(static_cast<std::size_t>(stride_px) * stride_px, 0);
       scratch.own[k] = scratch.least[k];
@@ -545,16 +480,26 @@ void PixelJudge::resize(int stride_px, int workers) {
 void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, DenseMap& map,
                        Executor& executor) {
   const int stride = grid.stride_px();
-  resize(stride, executor.workers());
+  resize(grid, executor.workers());
+  for (Scratch& scratch : scratch_) scratch.blender.begin(frame.full);
   executor.run(grid.rows() + 1, [&](int part, int worker) {
-    const int row = part - 1;
-    const int top = std::max(0, grid.y_of(row)), bottom = std::min(map.height, grid.y_of(row) + stride);
-    if (top < bottom) map.clear_rows(top, bottom);
+    const int row = part - 1, top = std::max(0, grid.y_of(row)), bottom = std::min(map.height, grid.y_of(row) + stride);
+    if (top >= bottom) return;
+    Scratch& scratch = scratch_[worker];
+    const std::span<const CellKind> kinds = scratch.blender.blend_row(grid, row, map);
     for (int column = -1; column < grid.columns(); ++column) {
+      const bool within = column >= 0 && column + 1 < grid.columns();
+      const CellKind kind = within ? kinds[column] : CellKind::kApart;
+      if (kind == CellKind::kClean) continue;
       Cell cell{frame, field, grid, map, column, row, 0, 0, 0, 0};
       cell.left = std::max(0, grid.x_of(column)), cell.top = top;
       cell.right = std::min(map.width, grid.x_of(column) + stride), cell.bottom = bottom;
-      if (cell.left < cell.right && cell.top < cell.bottom) judge_cell(cell, scratch_[worker]);
+      if (cell.left >= cell.right) continue;
+      if (kind == CellKind::kDoubtful) {
+        review(cell, scratch);
+      } else {
+        judge_cell(cell, scratch);
+      }
     }
   });
 }

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <array>
+#include <utility>
 #include <vector>
 
 #include "core/appearance/pattern_field.hpp"
+#include "core/dense/blend_cells.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/evidence_table.hpp"
 #include "core/dense/surface_grid.hpp"
@@ -43,13 +45,15 @@ class PixelJudge {
  private:
   static constexpr int kCandidates = 6;
   struct Scratch {
+    explicit Scratch(CellBlender blends) : blender(std::move(blends)) {}
+    CellBlender blender;
     std::vector<float> seen, evidence, sums, least[kCandidates], own[kCandidates];
     std::vector<SideEvidence> sides[kCandidates];
   };
   struct Cell;
-  void resize(int stride_px, int workers);
+  void resize(const SurfaceGrid& grid, int workers);
+  void review(Cell& cell, Scratch& scratch) const;
   void judge_cell(Cell& cell, Scratch& scratch) const;
-  void blend(const Cell& cell, const float* least, const float* own) const;
   void see(const Cell& cell, Scratch& scratch) const;
   void weigh(const Cell& cell, const SurfaceNode& node, int candidate, int as, Scratch& scratch) const;
   void choose(const Cell& cell, const Scratch& scratch) const;

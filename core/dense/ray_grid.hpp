@@ -28,6 +28,11 @@ class RayGrid {
            below * ((1 - right) * node[columns_] + right * node[columns_ + 1]);
   }
 
+  /// (x/z, y/z) of every kPitchPx-th pixel; the last ones lie beyond the image.
+  [[nodiscard]] const Eigen::Vector2f& node(int column, int row) const {
+    return nodes_[static_cast<std::size_t>(row) * columns_ + column];
+  }
+
   /// Ray of the last pixel before the next eighth one: all rays between lie on the line to it.
   [[nodiscard]] Eigen::Vector2f before_next(int x, int y) const { return at(x + kPitchPx - 1, y); }
 

@@ -48,11 +48,6 @@ std::string left_of(const DenseMap& map) {
   return drawing;
 }
 
-MapCleaner cleaner() {
-  const Calibration rig = paper_rig();
-  return {rig.cameras[0], rig.projector, std::make_shared<const RayGrid>(rig.cameras[0].lens)};
-}
-
 SurfaceSeed seed_at(float x, float y, float depth_mm = 1000) {
   return {{x, y}, {1 / depth_mm, 0, 0}};
 }
@@ -60,7 +55,7 @@ SurfaceSeed seed_at(float x, float y, float depth_mm = 1000) {
 TEST(DropSmallComponents, KeepsWhatIsLargeEnough) {
   DenseMap map = map_of({"##...#", "##...#", "......", "###..."});
   const std::vector<SurfaceSeed> seeds = {seed_at(0, 0), seed_at(5, 1), seed_at(2.3F, 2.8F)};
-  cleaner().drop_small_components(map, 3, seeds);
+  MapCleaner().drop_small_components(map, 3, seeds);
   EXPECT_EQ(left_of(map), "##....\n##....\n......\n###...\n");
   EXPECT_EQ(map.pixels[5], DensePixel::kSmallComponent);
 }
@@ -68,7 +63,7 @@ TEST(DropSmallComponents, KeepsWhatIsLargeEnough) {
 TEST(DropSmallComponents, AJumpInDepthParts) {
   DenseMap map = map_of({"####22", "####22"});
   const std::vector<SurfaceSeed> seeds = {seed_at(1, 1), seed_at(5, 1, 2000)};
-  cleaner().drop_small_components(map, 5, seeds);
+  MapCleaner().drop_small_components(map, 5, seeds);
   EXPECT_EQ(left_of(map), "####..\n####..\n");
 }
 
@@ -76,7 +71,7 @@ TEST(DropSmallComponents, WhatBearsNoSymbolHasToBeFarLarger) {
   const Drawing rows = {"###############..........", ".........................", "#########################"};
   const auto after = [&](const std::vector<SurfaceSeed>& seeds) {
     DenseMap map = map_of(rows);
-    cleaner().drop_small_components(map, 1, seeds);
+    MapCleaner().drop_small_components(map, 1, seeds);
     return map.measured(0);
   };
   EXPECT_FALSE(after({}));
@@ -84,20 +79,20 @@ TEST(DropSmallComponents, WhatBearsNoSymbolHasToBeFarLarger) {
   EXPECT_FALSE(after({seed_at(7, 0, 2000)})) << "a symbol behind it";
   EXPECT_FALSE(after({seed_at(7, 1), seed_at(7, 2), seed_at(20, 0), seed_at(-3, 0), seed_at(9, 40)})) << "beside it";
   DenseMap map = map_of(rows);
-  cleaner().drop_small_components(map, 1, {});
+  MapCleaner().drop_small_components(map, 1, {});
   EXPECT_TRUE(map.measured(50)) << "25 pixels are enough by themselves";
 }
 
 TEST(Prune, TakesWhatIsNearerToAHoleThanAsked) {
   const Drawing rows = {"......", ".#####", ".#####", ".#####", ".#####"};
   DenseMap map = map_of(rows);
-  cleaner().prune(map, 0, 0);
+  MapCleaner().prune(map, 0, 0);
   EXPECT_EQ(left_of(map), "......\n.#####\n.#####\n.#####\n.#####\n");
-  cleaner().prune(map, 1, 0);
+  MapCleaner().prune(map, 1, 0);
   EXPECT_EQ(left_of(map), "......\n......\n..####\n..####\n..####\n");
   EXPECT_EQ(map.pixels[7], DensePixel::kAtAnEdge);
   map = map_of(rows);
-  cleaner().prune(map, 2, 0);
+  MapCleaner().prune(map, 2, 0);
   EXPECT_EQ(left_of(map), "......\n......\n......\n...###\n...###\n");
 }
 
@@ -105,7 +100,7 @@ TEST(Prune, ASmallHoleWithinOneSurfaceIsNoEdge) {
   const Drawing rows = {"########", "#..##.##", "#.###..#", "########"};
   const auto after = [&](const Drawing& drawing, std::size_t most) {
     DenseMap map = map_of(drawing);
-    cleaner().prune(map, 1, most);
+    MapCleaner().prune(map, 1, most);
     return left_of(map);
   };
   EXPECT_EQ(after(rows, 3), "########\n#..##.##\n#.###..#\n########\n");
@@ -119,13 +114,13 @@ TEST(Prune, ASmallHoleWithinOneSurfaceIsNoEdge) {
 
 TEST(Prune, TakesBothSidesOfAJump) {
   DenseMap map = map_of({"###222", "###222", "###222"});
-  cleaner().prune(map, 1, 0);
+  MapCleaner().prune(map, 1, 0);
   EXPECT_EQ(left_of(map), "##..##\n##..##\n##..##\n");
 }
 
 TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
   DenseMap map = map_of({"##o##ooo", "##o##ooo", "##o##ooo", "##o##ooo"});
-  cleaner().drop_unlit_boundaries(map, 1);
+  MapCleaner().drop_unlit_boundaries(map, 1);
   EXPECT_EQ(left_of(map), "#####...\n#####...\n#####...\n#####...\n");
   EXPECT_EQ(map.pixels[5], DensePixel::kUnlit);
 }
@@ -133,37 +128,11 @@ TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
 TEST(DropUnlitRims, BridgesTwiceItsReachAcrossWords) {
   const std::string lit(60, '#'), row = lit + "oooooo" + lit, whole(126, '#');
   DenseMap map = map_of({row, row});
-  cleaner().drop_unlit_boundaries(map, 3);
+  MapCleaner().drop_unlit_boundaries(map, 3);
   EXPECT_EQ(left_of(map), whole + "\n" + whole + "\n");
   map = map_of({row, row});
-  cleaner().drop_unlit_boundaries(map, 2);
+  MapCleaner().drop_unlit_boundaries(map, 2);
   EXPECT_EQ(left_of(map).find('.'), 60U);
-}
-
-/// The middle row of the camera: one pixel sees a point at 1.5 m, another one behind it on the same ray of the
-/// projector.
-TEST(DropOccluded, ARayOfTheProjectorEndsAtItsFirstSurface) {
-  const Calibration rig = paper_rig();
-  const CalibratedCamera& camera = rig.cameras[0];
-  const RigidTransform camera_from_projector = camera.projector_from_camera.inverse();
-  const Eigen::Vector3d from = camera_from_projector.translation,
-                        ray = camera_from_projector.rotation * rig.projector.undistort({640, 400}).homogeneous();
-  DenseMap map;
-  map.reset(camera.lens.width_px, camera.lens.height_px);
-  std::vector<std::size_t> pixels;
-  for (const double distance : {1500.0, 1900.0}) {
-    const Eigen::Vector3d point = from + distance * ray;
-    const Eigen::Vector2d seen = camera.lens.project(point);
-    const std::size_t pixel =
-        static_cast<std::size_t>(std::lround(seen.y())) * map.width + static_cast<std::size_t>(std::lround(seen.x()));
-    map.depth_mm[pixel] = static_cast<float>(point.z()), map.sigma_mm[pixel] = 1, map.intensity[pixel] = 1;
-    map.pixels[pixel] = DensePixel::kMeasured;
-    pixels.push_back(pixel);
-  }
-  SerialExecutor executor;
-  cleaner().drop_occluded(map, executor);
-  EXPECT_EQ(map.pixels[pixels[0]], DensePixel::kMeasured);
-  EXPECT_EQ(map.pixels[pixels[1]], DensePixel::kOccluded);
 }
 
 }  // namespace
