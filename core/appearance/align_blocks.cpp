@@ -36,6 +36,18 @@ struct Summing {
   float *numbers, *sums;  // of the first block
 };
 
+/// Fetches the samples that the next group needs: it lies as far from this one as the last block from the first.
+inline __attribute__((always_inline)) void fetch_ahead(const FrameAndField& of, const Eight& e) {
+  constexpr int kRows = 4, kBlocks = 2;  // samples above and below; blocks that share a cache line
+  const int step_u = e.origin_u[kLanes - 1] - e.origin_u[0], step_v = e.origin_v[kLanes - 1] - e.origin_v[0];
+  for (int lane = 0; lane < kLanes; lane += kBlocks) {
+    const int u = std::clamp(e.origin_u[lane] + step_u + step_u / (kLanes - 1), 0, of.field_width - 1);
+    const int v = e.origin_v[lane] + step_v + step_v / (kLanes - 1);
+    for (int row = -kRows; row <= kRows; ++row)
+      __builtin_prefetch(of.samples + static_cast<std::ptrdiff_t>(std::clamp(v + row, 0, of.field_height - 1)) * of.field_width + u);
+  }
+}
+
 /// Sums up the pixels of a row of blocks, a group at a time.
 template <class T>
 inline __attribute__((always_inline)) void sum_row(const Summing<T>& in) {
@@ -60,6 +72,7 @@ inline __attribute__((always_inline)) void sum_row(const Summing<T>& in) {
     e.gain = numbers[BlockRow::kGain], e.gain_x = numbers[BlockRow::kGainX], e.gain_y = numbers[BlockRow::kGainY];
     e.offset = numbers[BlockRow::kOffset], e.noise = numbers[BlockRow::kNoise];
     find_scales(in.options, e);
+    fetch_ahead(in.of, e);
     const T* centres[kLanes];
     for (int lane = 0; lane < kLanes; ++lane)
       centres[lane] = in.pixels + in.y_px * in.of.stride + in.x_px + (column + lane) * side;

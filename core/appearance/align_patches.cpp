@@ -143,6 +143,26 @@ void align_eight(const GreyView& frame, double full, const PatternField& field, 
   std::visit([&](const auto& pixels) { align(pixels, full, field, options, window_px, tasks); }, frame);
 }
 
+void fetch_windows(const PatternField& field, int window_px, std::span<const PatchTask* const> tasks) {
+  constexpr int kPerLine = 64 / sizeof(std::uint32_t);  // samples in a cache line
+  const float reach = 0.5F * static_cast<float>(window_px * PatternField::kSamplesPerPx);
+  for (const PatchTask* task : tasks) {
+    const Eigen::Matrix3f& base = task->map.base;
+    const auto samples = [&](int row) {
+      return static_cast<int>(reach * (std::abs(base(row, 0)) + std::abs(base(row, 1)))) + 1;
+    };
+    const int reach_u = samples(0), reach_v = samples(1);
+    const Eigen::Vector2i middle =
+        (task->map.origin_px + Eigen::Vector2i::Constant(PatternField::kBorderPx)) * PatternField::kSamplesPerPx;
+    const int first_u = std::max(0, middle.x() - reach_u), last_u = std::min(field.width() - 1, middle.x() + reach_u);
+    const int first_v = std::max(0, middle.y() - reach_v), last_v = std::min(field.height() - 1, middle.y() + reach_v);
+    for (int v = first_v; v <= last_v; ++v) {
+      const std::uint32_t* const row = field.samples() + static_cast<std::ptrdiff_t>(v) * field.width();
+      for (int u = first_u; u < last_u + kPerLine; u += kPerLine) __builtin_prefetch(row + u);
+    }
+  }
+}
+
 void align_cells(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
                  std::span<CellTask> tasks) {
   for (CellTask& task : tasks) task.patch.failed = false;

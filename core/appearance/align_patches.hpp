@@ -10,6 +10,9 @@
 
 namespace slsd {
 
+/// Fetches the part of the field that the windows need into the cache, for a later align_eight().
+void fetch_windows(const PatternField& field, int window_px, std::span<const PatchTask* const> tasks);
+
 /// Aligns windows of the frame with the pattern by least squares of
 ///
 ///     I(x, y) = (gain + gain_x x + gain_y y) P(p(x, y)) + offset

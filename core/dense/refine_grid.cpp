@@ -9,7 +9,7 @@ namespace slsd {
 namespace {
 
 /// Distance of coarse nodes, px: surfaces that differ from a second order by a tenth of a pixel within it are rare.
-constexpr int kCoarsePx = 16;
+constexpr int kCoarsePx = 24;
 /// Windows with fewer pixels, for each node of the grid, are as quick to align alone.
 constexpr int kSharedMin = 4;
 /// Largest difference between the surfaces of a cell's corners at its middle, projector px.

@@ -20,6 +20,8 @@ constexpr double kBeyondPx = 32;
 constexpr int kLevelsMost = 320;
 /// Largest and smallest number of nodes of known depth from which the evidence is learnt.
 constexpr std::size_t kKnownMost = 256, kKnownLeast = 32;
+/// Number of wrong depths, of each of these nodes, that show what chance gives.
+constexpr int kWrongLevels = 48;
 /// Number of levels around the true depth within which a window is similar for a reason.
 constexpr int kNearLevels = 4;
 /// Share of the windows that lie only partly on the surface.
@@ -132,33 +134,38 @@ bool SurfaceSearch::choose_levels(const SurfaceGrid& grid) {
   return levels_.count > 2 * kNearLevels;
 }
 
-/// Correlates the window with the pattern at each depth; false if it has too little contrast.
-bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
-                            const Eigen::Vector2i& place, Scratch& scratch) const {
+/// Reads the window, without its mean; false if it has too little contrast.
+bool SurfaceSearch::read_window(const DenseFrame& frame, const SurfaceGrid& grid, const Eigen::Vector2i& place,
+                                Scratch& scratch) const {
   const auto [width, height] = grid.frame_px();
   const int half = window_px_ / 2;
   if (place.x() < half || place.y() < half || place.x() + half >= width || place.y() + half >= height) return false;
-  scratch.levels.resize(xs_.size()), scratch.alike.resize(static_cast<std::size_t>(levels_.count));
+  scratch.levels.resize(xs_.size());
   float sum = 0, pixels = 0;
-  const bool seen = std::visit(
+  std::visit(
       [&](const auto& image) {
+        const auto* const middle = image.row(place.y()) + place.x();
+        const auto stride = static_cast<std::ptrdiff_t>(image.stride);
         for (std::size_t i = 0; i < xs_.size(); ++i) {
-          const auto level =
-              static_cast<float>(image.at(place.x() + static_cast<int>(xs_[i]), place.y() + static_cast<int>(ys_[i])));
+          const auto level = static_cast<float>(middle[static_cast<int>(ys_[i]) * stride + static_cast<int>(xs_[i])]);
           scratch.levels[i] = level, sum += weights_[i] * level, pixels += weights_[i];
         }
-        return true;
       },
       frame.pixels);
-  if (!seen) return false;
-  float squares = 0;
   const float mean = sum / pixels;
+  scratch.pixels = pixels, scratch.squares = 0;
   for (std::size_t i = 0; i < xs_.size(); ++i) {
     scratch.levels[i] = weights_[i] * (scratch.levels[i] - mean);
-    squares += scratch.levels[i] * scratch.levels[i];
+    scratch.squares += scratch.levels[i] * scratch.levels[i];
   }
   const float noise = kNoiseMultipleMin * frame.noise.at(mean);
-  if (squares < noise * noise * pixels) return false;
+  return scratch.squares >= noise * noise * pixels;
+}
+
+/// Correlates the window that was read with the pattern, from one depth on.
+void SurfaceSearch::compare(const PatternField& field, const SurfaceGrid& grid, const Eigen::Vector2i& place,
+                            int first_level, int count, Scratch& scratch) const {
+  scratch.alike.resize(static_cast<std::size_t>(count));
   Comparing comparing{scratch.levels.data(),
                       weights_.data(),
                       xs_.data(),
@@ -171,14 +178,14 @@ bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, 
                       field.samples(),
                       field.width(),
                       field.height(),
-                      pixels,
-                      squares,
+                      scratch.pixels,
+                      scratch.squares,
                       0};
   // The projector's lens is linearised again after so many levels.
   constexpr int kLinear = 32;
-  for (int first = 0; first < levels_.count; first += kLinear) {
-    comparing.depths = std::min(kLinear, levels_.count - first);
-    const double middle = levels_.at(first + comparing.depths / 2);
+  for (int first = 0; first < count; first += kLinear) {
+    comparing.depths = std::min(kLinear, count - first);
+    const double middle = levels_.at(first_level + first + comparing.depths / 2);
     const PatchMap map = grid.map_around(place.cast<double>(), middle);
     const auto per_level = static_cast<float>(levels_.step / map.inverse_depth_per_px);
     const auto back = static_cast<float>(comparing.depths / 2);
@@ -191,7 +198,6 @@ bool SurfaceSearch::compare(const DenseFrame& frame, const PatternField& field, 
     comparing.origin_v = static_cast<float>(map.origin_px.y() + PatternField::kBorderPx);
     Cloned<compare_lanes>::call(comparing, scratch.alike.data() + first);
   }
-  return true;
 }
 
 /// Learns the evidence of a correlation from windows of known depth: at that depth, and at all others.
@@ -205,14 +211,18 @@ bool SurfaceSearch::learn(const DenseFrame& frame, const PatternField& field, co
       const SurfaceNode* node = grid.good(column, row);
       if (node == nullptr || nth++ % step != 0) continue;
       Scratch& scratch = scratch_[0];
-      if (!compare(frame, field, grid, {grid.x_of(column), grid.y_of(row)}, scratch)) continue;
+      const Eigen::Vector2i place(grid.x_of(column), grid.y_of(row));
+      if (!read_window(frame, grid, place, scratch)) continue;
       const auto level = static_cast<int>(
           std::lround((static_cast<double>(node->plane.inverse_depth) - levels_.first) / levels_.step));
-      float best = -1;
-      for (int k = 0; k < levels_.count; ++k) {
-        if (std::abs(k - level) <= 1) best = std::max(best, scratch.alike[k]);
-        if (std::abs(k - level) > kNearLevels) ++elsewhere[bin_of(scratch.alike[k], kBins)], ++all_elsewhere;
-      }
+      const int least = std::clamp(level - 1, 0, levels_.count - 1), most = std::clamp(level + 1, 0, levels_.count - 1);
+      compare(field, grid, place, least, most - least + 1, scratch);
+      const float best = level < -1 || level > levels_.count ? -1 : *std::ranges::max_element(scratch.alike);
+      const int wrong = std::min(kWrongLevels, levels_.count);
+      const int first = static_cast<int>(nth * kWrongLevels % static_cast<std::size_t>(levels_.count - wrong + 1));
+      compare(field, grid, place, first, wrong, scratch);
+      for (int k = 0; k < wrong; ++k)
+        if (std::abs(first + k - level) > kNearLevels) ++elsewhere[bin_of(scratch.alike[k], kBins)], ++all_elsewhere;
       ++there[bin_of(best, kBins)], ++all_there;
     }
   }
@@ -241,6 +251,50 @@ void SurfaceSearch::find_open(const SurfaceGrid& grid, const Lines& lines) {
   }
 }
 
+/// Calls take() for each open place with those before it on a path: on the line before, beside it; -1 for none.
+template <class Take>
+void SurfaceSearch::follow(const Lines& lines, bool forwards, const Take& take) const {
+  for (int nth = 0; nth < lines.lines; ++nth) {
+    const int line = forwards ? nth : lines.lines - 1 - nth, before = forwards ? line - 1 : line + 1;
+    for (int index = 0; index < lines.per_line; ++index) {
+      const std::int32_t open = open_[static_cast<std::size_t>(line) * lines.per_line + index];
+      if (open < 0) continue;
+      std::array<std::int32_t, 3> others{-1, -1, -1};
+      for (int beside = -1; beside <= 1 && nth > 0; ++beside)
+        if (index + beside >= 0 && index + beside < lines.per_line)
+          others[beside + 1] = open_[static_cast<std::size_t>(before) * lines.per_line + index + beside];
+      take(open, others);
+    }
+  }
+}
+
+/// Drops the places on no path with enough windows for the evidence: windows without contrast add none.
+void SurfaceSearch::drop_short_paths(const DenseFrame& frame, const SurfaceGrid& grid, const Lines& lines) {
+  std::vector<int>&own = own_, &longest = longest_, &all = all_;
+  own.resize(places_.size()), all.assign(places_.size(), 0), longest.resize(places_.size());
+  for (std::size_t i = 0; i < places_.size(); ++i) own[i] = read_window(frame, grid, places_[i], scratch_[0]) ? 1 : 0;
+  for (const bool forwards : {true, false}) {
+    follow(lines, forwards, [&](std::int32_t open, const std::array<std::int32_t, 3>& others) {
+      int before = 0;
+      for (const std::int32_t other : others)
+        if (other >= 0) before = std::max(before, longest[other]);
+      longest[open] = before + own[open];
+      all[open] += longest[open];
+    });
+  }
+  std::int32_t kept = 0;
+  for (std::int32_t& open : open_) {
+    if (open < 0) continue;
+    const auto at = static_cast<std::size_t>(open);
+    const auto windows = static_cast<float>(all[at] - own[at]);
+    open = -1;
+    if (windows * most_ < kTotalEvidenceMin) continue;
+    places_[static_cast<std::size_t>(kept)] = places_[at];
+    open = kept++;
+  }
+  places_.resize(static_cast<std::size_t>(kept));
+}
+
 /// Computes the evidence of each place at each depth.
 void SurfaceSearch::weigh(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
                           Executor& executor) {
@@ -252,10 +306,11 @@ void SurfaceSearch::weigh(const DenseFrame& frame, const PatternField& field, co
     const std::size_t first = static_cast<std::size_t>(part) * kInPart, end = std::min(places_.size(), first + kInPart);
     for (std::size_t i = first; i < end; ++i) {
       float* const scores = scores_.data() + i * count;
-      if (!compare(frame, field, grid, places_[i], scratch)) {
+      if (!read_window(frame, grid, places_[i], scratch)) {
         std::fill(scores, scores + count, says_[0]);
         continue;
       }
+      compare(field, grid, places_[i], 0, levels_.count, scratch);
       for (std::size_t k = 0; k < count; ++k) scores[k] = says_[bin_of(scratch.alike[k], kBins)];
     }
   });
@@ -268,25 +323,17 @@ void SurfaceSearch::add_up(const Lines& lines, bool forwards, std::vector<float>
   best.resize(scores_.size());
   ways_.resize(static_cast<std::size_t>(count) + 2);
   float* const from = ways_.data() + 1;  // by level, with an empty entry at each end
-  for (int nth = 0; nth < lines.lines; ++nth) {
-    const int line = forwards ? nth : lines.lines - 1 - nth, before = forwards ? line - 1 : line + 1;
-    for (int index = 0; index < lines.per_line; ++index) {
-      const std::int32_t open = open_[static_cast<std::size_t>(line) * lines.per_line + index];
-      if (open < 0) continue;
-      std::fill(ways_.begin(), ways_.end(), 0.F);
-      for (int beside = -1; beside <= 1 && nth > 0; ++beside) {
-        if (index + beside < 0 || index + beside >= lines.per_line) continue;
-        const std::int32_t other = open_[static_cast<std::size_t>(before) * lines.per_line + index + beside];
-        if (other < 0) continue;
-        const float* const at = best.data() + static_cast<std::size_t>(other) * count;
-        for (int k = 0; k < count; ++k) from[k] = std::max(from[k], at[k]);
-      }
-      const float* const scores = scores_.data() + static_cast<std::size_t>(open) * count;
-      float* const to = best.data() + static_cast<std::size_t>(open) * count;
-      for (int k = 0; k < count; ++k)
-        to[k] = scores[k] + std::max(from[k], std::max(from[k - 1], from[k + 1]) - kOfStep);
+  follow(lines, forwards, [&](std::int32_t open, const std::array<std::int32_t, 3>& others) {
+    std::fill(ways_.begin(), ways_.end(), 0.F);
+    for (const std::int32_t other : others) {
+      if (other < 0) continue;
+      const float* const at = best.data() + static_cast<std::size_t>(other) * count;
+      for (int k = 0; k < count; ++k) from[k] = std::max(from[k], at[k]);
     }
-  }
+    const float* const scores = scores_.data() + static_cast<std::size_t>(open) * count;
+    float* const to = best.data() + static_cast<std::size_t>(open) * count;
+    for (int k = 0; k < count; ++k) to[k] = scores[k] + std::max(from[k], std::max(from[k - 1], from[k + 1]) - kOfStep);
+  });
 }
 
 /// Takes seeds at places with enough evidence for one depth, and much more than for any other.
@@ -311,8 +358,8 @@ std::span<const SurfaceSeed> SurfaceSearch::find(const DenseFrame& frame, const 
                                                  const SurfaceGrid& grid, Executor& executor) {
   seeds_.clear();
   if (scratch_.size() < static_cast<std::size_t>(executor.workers())) scratch_.resize(executor.workers());
-  if (!choose_levels(grid) || !learn(frame, field, grid)) return seeds_;
   const auto [width, height] = grid.frame_px();
+  bool learnt = false;
   for (const bool upright : {true, false}) {
     Lines lines{upright, (window_px_ + 1) / 3, window_px_, 0, 0};
     for (;; lines.beside_px *= 2) {
@@ -321,7 +368,10 @@ std::span<const SurfaceSeed> SurfaceSearch::find(const DenseFrame& frame, const 
       find_open(grid, lines);
       if (places_.size() <= kPlacesMost) break;
     }
+    drop_short_paths(frame, grid, lines);
     if (places_.empty()) continue;
+    if (!learnt && !(choose_levels(grid) && learn(frame, field, grid))) return seeds_;
+    learnt = true;
     weigh(frame, field, grid, executor);
     add_up(lines, true, before_);
     add_up(lines, false, after_);

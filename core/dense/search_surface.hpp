@@ -51,14 +51,20 @@ class SurfaceSearch {
   };
   struct Scratch {
     std::vector<float> levels, alike;
+    float pixels = 0, squares = 0;  // number of the window's pixels, and sum of the squared levels
   };
   static constexpr int kBins = 16;
 
   [[nodiscard]] bool choose_levels(const SurfaceGrid& grid);
-  [[nodiscard]] bool compare(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
-                             const Eigen::Vector2i& place, Scratch& scratch) const;
+  [[nodiscard]] bool read_window(const DenseFrame& frame, const SurfaceGrid& grid, const Eigen::Vector2i& place,
+                                 Scratch& scratch) const;
+  void compare(const PatternField& field, const SurfaceGrid& grid, const Eigen::Vector2i& place, int first_level,
+               int count, Scratch& scratch) const;
   [[nodiscard]] bool learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid);
   void find_open(const SurfaceGrid& grid, const Lines& lines);
+  template <class Take>
+  void follow(const Lines& lines, bool forwards, const Take& take) const;
+  void drop_short_paths(const DenseFrame& frame, const SurfaceGrid& grid, const Lines& lines);
   void weigh(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, Executor& executor);
   void add_up(const Lines& lines, bool forwards, std::vector<float>& best);
   void take_seeds();
@@ -72,6 +78,7 @@ class SurfaceSearch {
   std::vector<Eigen::Vector2i> places_;
   std::vector<float> scores_, before_, after_;  // for the open places, by level
   std::vector<float> ways_, depths_;
+  std::vector<int> own_, longest_, all_;  // for the open places: windows with contrast, at the place and on its paths
   std::vector<Scratch> scratch_;
   std::vector<SurfaceSeed> seeds_;
 };

@@ -90,9 +90,12 @@ bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTa
 /// Steps until each fit has settled: from a neighbour's plane, one step is enough for most.
 void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const {
   for (int step = 0; step < kStepsMost && count > 0; ++step) {
+    const auto eight = [&](std::size_t first) {
+      return std::span(batch.active).subspan(first, std::min<std::size_t>(kEight, count - first));
+    };
     for (std::size_t i = 0; i < count; i += kEight) {
-      align_eight(frame.pixels, frame.full, field, kAlign, options_.window_px,
-                  std::span(batch.active).subspan(i, std::min<std::size_t>(kEight, count - i)));
+      if (step == 0 && i + kEight < count) fetch_windows(field, options_.window_px, eight(i + kEight));
+      align_eight(frame.pixels, frame.full, field, kAlign, options_.window_px, eight(i));
     }
     const auto end = std::remove_if(
         batch.active.begin(), batch.active.begin() + static_cast<std::ptrdiff_t>(count),
