@@ -185,6 +185,7 @@ Cloud Scanner::scan(const ScanOptions& options) {
   if (options.normals) params["normals"] = true;
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;
+  if (!options.preset.empty()) params["preset"] = options.preset;
   if (options.picture) params["picture"] = true;
   if (options.why) params["why"] = true;
   if (options.frames) params["frames"] = "raw";

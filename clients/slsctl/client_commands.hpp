@@ -39,6 +39,8 @@ struct Failure;
 [[nodiscard]] int top_command(const ClientOptions& options);
 /// Changes keys of the service without a restart.
 [[nodiscard]] int set_command(const ClientOptions& options);
+/// Saves, lists, shows, uses or deletes presets.
+[[nodiscard]] int preset_command(const ClientOptions& options);
 /// Shows the keys that are set, and the source of each.
 [[nodiscard]] int settings_command(const ClientOptions& options);
 /// Scans repeatedly while the previous scan's frames are written. Ends after the requested number, after the time, or

@@ -44,7 +44,8 @@ struct ClientOptions {
   std::optional<double> gain_max_db;        ///< exposure: the highest to propose
   std::optional<int> timeout_ms;
   std::vector<std::string> assignments;  ///< set: "decode.density=pixels"
-  std::string action = "begin";          ///< calibrate: this, or "look", "end" or "cancel"
+  std::string action = "begin";          ///< calibrate: this, or "look", "end" or "cancel"; preset: "use" and others
+  std::string preset;                    ///< scan, preset: its name
   std::string board, ruler, code;        ///< calibrate: as for slsd --calibrate; empty: its defaults
   std::optional<int> poses;              ///< calibrate
   bool resume = false;                   ///< calibrate: continue with the last session's pictures

@@ -122,6 +122,7 @@ json scan_parameters(const ClientOptions& options, const std::string& density) {
   if (options.why) params["why"] = true;
   if (!density.empty()) params["density"] = density;
   if (!options.camera.empty()) params["camera"] = options.camera;
+  if (!options.preset.empty()) params["preset"] = options.preset;
   if (options.normals) params["normals"] = true;
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;

@@ -68,6 +68,8 @@ void add_scan(CLI::App& app, ClientOptions& options) {
       ->check(one_of({"ply", "pcd", "tiff", "stl", "obj", "glb"}))
       ->needs(output);
   add_density(scan, options);
+  scan->add_option("--preset", options.preset, "scan with the settings of this preset, which stay in force")
+      ->type_name("NAME");
   scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
   scan->add_flag("--mesh", options.mesh, "join the points (of pixels) to triangles; .stl, .obj and .glb always do");
   scan->add_flag("--texture", options.texture, "also take a frame in white light, for the points' intensities");
@@ -226,6 +228,26 @@ void add_settings(CLI::App& app, ClientOptions& options) {
               "  slsctl settings\n");
 }
 
+/// The error in a preset's command; empty: none.
+std::string wrong_preset(const ClientOptions& options, const std::string& command) {
+  if (command != "preset") return {};
+  if (options.action == "list") return options.preset.empty() ? "" : "preset list takes no name";
+  return options.preset.empty() ? "NAME is missing: preset " + options.action + " NAME" : "";
+}
+
+void add_preset(CLI::App& app, ClientOptions& options) {
+  CLI::App* preset = add_command(app, kSetUp, "preset", "store the settings that are set by name, and use them again",
+                                 "  slsctl preset save part-a\n"
+                                 "  slsctl preset list\n"
+                                 "  slsctl preset use part-a\n"
+                                 "  slsctl scan --preset part-a cloud.ply\n");
+  preset->add_option("ACTION", options.action, "what to do")
+      ->required()
+      ->check(one_of({"save", "use", "list", "show", "delete"}));
+  preset->add_option("NAME", options.preset, "the preset's name: letters, digits, dots, dashes, underscores")
+      ->type_name("NAME");
+}
+
 void add_bundle(CLI::App& app, ClientOptions& options) {
   CLI::App* bundle = add_command(app, kDiagnose, "bundle", "write the last scans with their frames and settings",
                                  "  slsctl bundle\n  slsctl bundle fault.tar\n");
@@ -242,6 +264,7 @@ void add_commands(CLI::App& app, ClientOptions& options) {
   add_project(app, options);
   add_image(app, options, kSetUp, "frame", "write a camera's frame", "  slsctl frame left.png --camera left\n");
   add_settings(app, options);
+  add_preset(app, options);
   add_image(app, options, kDiagnose, "preview", "scan, and write the frame with the decoded symbols drawn in",
             "  slsctl preview decoded.png\n");
   add_image(app, options, kDiagnose, "pattern", "write the image of the pattern", "  slsctl pattern pattern.png\n");
@@ -255,6 +278,7 @@ int run(const std::string& command, const ClientOptions& options) {
   if (command == "watch") return slsd::watch_command(options);
   if (command == "metrics") return slsd::metrics_command(options);
   if (command == "set") return slsd::set_command(options);
+  if (command == "preset") return slsd::preset_command(options);
   if (command == "settings") return slsd::settings_command(options);
   if (command == "bundle") return slsd::bundle_command(options);
   if (command == "calibrate") return slsd::calibrate_command(options);
@@ -297,6 +321,7 @@ int main(int argc, char** argv) {
   const auto check = [&] {
     command = app.get_subcommands().front()->get_name();
     auto wrong = wrong_frames(options);
+    if (wrong.empty()) wrong = wrong_preset(options, command);
     if (wrong.empty()) wrong = slsd::wrong_outputs(options, command);
     if (!wrong.empty()) throw CLI::ValidationError(wrong);
   };

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
@@ -45,6 +46,8 @@ struct ServiceState {
   std::function<std::uint64_t()> log_lines_dropped = {};
   /// Reads the configuration again, overlays these settings, then answers.
   std::function<void(nlohmann::json settings, Respond)> reload = {};
+  /// The number of scans that asked for a preset and are under way; meanwhile no setting changes.
+  std::shared_ptr<std::atomic<int>> preset_scans = std::make_shared<std::atomic<int>>(0);
   nlohmann::json settings = nlohmann::json::object();  ///< set over the socket, in the form of merge_settings()
   /// Writes a bundle of the last scans, then answers with its bytes.
   std::function<void(Scanner::Answer<std::string>)> bundle = {};

@@ -219,6 +219,10 @@ void Service::reload(const nlohmann::json& settings, Respond answered) {
     const Error busy{ErrorCode::kBusy, "another change of the settings is under way: try again", {}};
     return answered(tl::unexpected(rpc_error(busy)));
   }
+  if (sets && *state_.preset_scans > 0) {
+    const Error busy{ErrorCode::kBusy, "a scan with a preset is under way: try again after it", {}};
+    return answered(tl::unexpected(rpc_error(busy)));
+  }
   ++reloads_;
   setting_ = sets;
   notifier_.reloading();

@@ -14,7 +14,7 @@ import unittest
 from service import BIN, Service, slsctl, slsd
 
 WRONG_CONFIGURATION = 78
-COMMANDS = {"scan", "record", "status", "watch", "top", "metrics", "calibrate", "exposure", "light", "project", "frame", "set", "settings",
+COMMANDS = {"scan", "record", "status", "watch", "top", "metrics", "calibrate", "exposure", "light", "project", "frame", "set", "settings", "preset",
             "preview", "pattern", "bundle"}
 
 

@@ -79,7 +79,7 @@ class Scanner:
 
     def scan(self, *, timeout_s: float | None = 5.0, density: Density | None = None, normals: bool = False,
              texture: bool = False, ambient: bool = False, picture: bool = False, camera: str | None = None,
-             frames: bool = False, shared: bool = True, why: bool = False) -> Cloud:
+             frames: bool = False, shared: bool = True, why: bool = False, preset: str | None = None) -> Cloud:
         """Takes one scan.
 
         density  "symbols": a point for each symbol of the pattern; "pixels": one for each camera pixel; None: as
@@ -94,8 +94,9 @@ class Scanner:
                  service lends a few dense clouds at once. False copies
         why      lists the rules that rejected regions, with remedies, in `description["reasons"]`; the picture marks
                  each region by its rule
+        preset   puts the settings of this preset into force, where they stay, and scans with them
         """
-        params = _params(format="ply", transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
+        params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
                          camera=camera, frames="raw" if frames else None, why=why)
         answer = self._call("scan", params, timeout_s)

@@ -33,6 +33,8 @@ constexpr std::array kMethods{
     RpcMethod{"frame", Role::kScan, run_frame, unless_as_shown},
     RpcMethod{"metrics", Role::kObserve, run_metrics},
     RpcMethod{"pattern", Role::kObserve, run_pattern},
+    RpcMethod{"preset", Role::kAdminister, run_preset, always},
+    RpcMethod{"presets", Role::kObserve, run_presets},
     RpcMethod{"preview", Role::kScan, run_preview, always},
     RpcMethod{"project", Role::kAdminister, run_project, always},
     RpcMethod{"reload", Role::kAdminister, run_reload, always},

@@ -19,7 +19,14 @@ RunMethod run_scan, run_preview, run_frame, run_subscribe, run_unsubscribe;
 RunMethod run_pattern, run_project;
 /// Methods for the service's state and settings: state_methods.cpp.
 RunMethod run_status, run_metrics, run_bundle, run_settings, run_set, run_reload;
+/// Methods for presets: preset_methods.cpp.
+RunMethod run_preset, run_presets;
 /// The method that calibrates: calibrate_methods.cpp.
 RunMethod run_calibrate;
+
+/// Puts settings into force; the reply has all that are set.
+void use_settings(ServiceState& state, nlohmann::json settings, Respond respond);
+/// The settings to put into force for a preset. @errors of read_presets() and settings_of_preset()
+[[nodiscard]] Result<nlohmann::json> find_preset(const ServiceState& state, const std::string& name);
 
 }  // namespace slsd

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <atomic>
 #include <chrono>
+#include <memory>
 #include <optional>
+#include <utility>
 
 #include <asio/post.hpp>
 
@@ -132,28 +135,83 @@ Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameC
   return reply;
 }
 
+// A request for a scan, read from its parameters.
+struct AskedScan {
+  CloudForm form;
+  bool as_memfd;
+  FrameCoding frames;
+  ScanRequest request;
+  std::string preset;  ///< empty: the settings in force
+};
+
+tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceState& state, const Session& session) {
+  ParamReader reader(params);
+  AskedScan asked;
+  asked.form = read_form(reader, state);
+  asked.as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
+  asked.request.deadline = deadline_in(read_timeout(reader, state));
+  asked.request.picture = reader.boolean("picture", false);
+  asked.request.why = reader.boolean("why", false);
+  asked.request.frames = asked.frames = frame_coding(reader.choice("frames", {"none", "raw", "png"}));
+  asked.request.camera = reader.text("camera");
+  asked.request.texture = reader.boolean("texture", false);
+  asked.request.ambient = reader.boolean("ambient", false);
+  asked.request.formats = CloudFormats::only(asked.form);
+  asked.request.gone = session.gone();
+  asked.preset = reader.text("preset");
+  if (auto error = reader.error()) return tl::unexpected(*error);
+  return asked;
+}
+
+// Keeps others from changing the settings while a scan with a preset is under way.
+class PresetHold {
+ public:
+  explicit PresetHold(std::shared_ptr<std::atomic<int>> count) : count_(std::move(count)) { ++*count_; }
+  ~PresetHold() { release(); }
+  PresetHold(const PresetHold&) = delete;
+  PresetHold& operator=(const PresetHold&) = delete;
+  void release() {
+    if (const auto count = std::exchange(count_, nullptr)) --*count;
+  }
+
+ private:
+  std::shared_ptr<std::atomic<int>> count_;
+};
+
+void start_scan(ServiceState& state, const AskedScan& asked, Session& session, Respond respond) {
+  if (auto refused = refused_form(asked.form)) return respond(tl::unexpected(*refused));
+  if (auto refused = session.reserve(expected_bytes(state, asked.request, asked.form)))
+    return respond(tl::unexpected(*refused));
+  state.scanner.scan(asked.request, carry_scan(state, std::move(respond), [asked](const ScanResult& scan) {
+                       auto outcome = scan_reply(scan, asked.form, asked.as_memfd, asked.frames, asked.request.why);
+                       if (outcome && !asked.preset.empty()) outcome->result["preset"] = asked.preset;
+                       return outcome;
+                     }));
+}
+
 }  // namespace
 
 void run_scan(ServiceState& state, const json& params, Session& session, Respond respond) {
-  ParamReader reader(params);
-  const CloudForm form = read_form(reader, state);
-  const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
-  const int timeout_ms = read_timeout(reader, state);
-  const bool picture = reader.boolean("picture", false);
-  const bool why = reader.boolean("why", false);
-  const FrameCoding frames = frame_coding(reader.choice("frames", {"none", "raw", "png"}));
-  const std::string camera = reader.text("camera");
-  const bool texture = reader.boolean("texture", false);
-  const bool ambient = reader.boolean("ambient", false);
-  if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
-  const ScanRequest request{deadline_in(timeout_ms),  picture,        camera, frames, texture, ambient,
-                            CloudFormats::only(form), session.gone(), why};
-  if (auto refused = session.reserve(expected_bytes(state, request, form))) return respond(tl::unexpected(*refused));
-  state.scanner.scan(request,
-                     carry_scan(state, std::move(respond), [form, as_memfd, frames, why](const ScanResult& scan) {
-                       return scan_reply(scan, form, as_memfd, frames, why);
-                     }));
+  auto asked = read_scan(params, state, session);
+  if (!asked) return respond(tl::unexpected(asked.error()));
+  if (asked->preset.empty()) return start_scan(state, *asked, session, std::move(respond));
+  auto settings = find_preset(state, asked->preset);
+  if (!settings) return respond(tl::unexpected(rpc_error(settings.error())));
+  // The scan begins in the same turn of the event loop as its settings come into force: no other comes between.
+  const auto scan = [&state, params, asked = *asked, waiting = session.shared_from_this()](Respond answer) {
+    auto again = read_scan(params, state, *waiting);  // by the preset's density
+    if (!again) return answer(tl::unexpected(again.error()));
+    again->request.deadline = asked.request.deadline;
+    const auto hold = std::make_shared<PresetHold>(state.preset_scans);
+    start_scan(state, *again, *waiting, [hold, answer = std::move(answer)](Outcome outcome) {
+      hold->release();
+      answer(std::move(outcome));
+    });
+  };
+  if (*settings == state.settings) return scan(std::move(respond));
+  use_settings(state, std::move(*settings), [scan, respond = std::move(respond)](Outcome outcome) {
+    outcome ? scan(respond) : respond(std::move(outcome));
+  });
 }
 
 void run_preview(ServiceState& state, const json& params, Session& session, Respond respond) {

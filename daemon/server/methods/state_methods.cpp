@@ -62,16 +62,20 @@ void run_reload(ServiceState& state, const json& params, Session&, Respond respo
   state.reload(state.settings, std::move(respond));
 }
 
-void run_set(ServiceState& state, const json& params, Session&, Respond respond) {
-  auto settings = merge_settings(state.settings, params);
-  if (!settings) return respond(tl::unexpected(invalid_params(settings.error().message)));
-  state.reload(std::move(*settings), [&state, respond = std::move(respond)](Outcome outcome) {
+void use_settings(ServiceState& state, json settings, Respond respond) {
+  state.reload(std::move(settings), [&state, respond = std::move(respond)](Outcome outcome) {
     if (outcome) {
       outcome->result["set"] = state.settings;
       if (!outcome->result.contains("not_kept")) outcome->result["not_kept"] = nullptr;
     }
     respond(std::move(outcome));
   });
+}
+
+void run_set(ServiceState& state, const json& params, Session&, Respond respond) {
+  auto settings = merge_settings(state.settings, params);
+  if (!settings) return respond(tl::unexpected(invalid_params(settings.error().message)));
+  use_settings(state, std::move(*settings), std::move(respond));
 }
 
 }  // namespace slsd

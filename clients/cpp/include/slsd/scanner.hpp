@@ -25,6 +25,7 @@ struct ScanOptions {
   bool frames = false;                      ///< the frames themselves
   bool why = false;  ///< list the rules that rejected regions, in `reasons` of the description; the picture marks each
                      ///< region by its rule
+  std::string preset;  ///< puts its settings into force, where they stay, and scans with them; empty: none
 };
 
 struct StreamOptions {
