@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 
 #include "core/clones.hpp"
 #include "core/dense/surface_grid.hpp"
@@ -56,15 +57,29 @@ constexpr float kOverlap[kFuseReach] = {9, 3};
 /// this factor: for windows much wider than strides, the series does not hold.
 constexpr float kBendBeyond = 1 / 2.4F, kWindowBeyond = 6 / (2.4F * 40), kBeyondMost = 1.2F;
 
+/// Numbers of each node: kInformation is that of a slope, kVariance the result.
+enum Around {
+  kInverseDepth,
+  kSlopeX,
+  kSlopeY,
+  kPxPer,
+  kNoiseSquared,
+  kSlopeNoise,
+  kInformation,
+  kGood,
+  kInputs,
+  kVariance = kInputs,
+  kNumbers
+};
+
 /// Inputs of fuse_lanes(): eight nodes of a row and their neighbours, in the order of Around.
 struct Fusing {
-  const float* around[7];
+  const float* around[kInputs];
   std::ptrdiff_t row;  // distance between rows
   float stride, of_bend, of_disagreement;
   float beyond;       // factor of the bend correction
   const float* left;  // for each reach, see left_of_variance()
 };
-enum Around { kInverseDepth, kSlopeX, kSlopeY, kPxPer, kNoisePx, kSlopeNoise, kGood, kVariance };
 
 /// Results of fuse_lanes(): planes in projector px relative to the nodes' own, the addition to sigma squared, and the
 /// share of sigma squared that remains.
@@ -72,13 +87,29 @@ struct Fused {
   Lanes off, slope_x, slope_y, left, more;
 };
 
-/// The sums of a regression of slopes by place along an axis.
-struct BendSums {
-  Lanes w, x, xx, s, xs;
+/// Sums over nodes: of their mean, and of the regressions of slopes by place along both axes.
+struct FuseSums {
+  Lanes weights, values, slopes_x, slopes_y, squares, expected, count;
+  Lanes w, x[2], xx[2], s[2], xs[2];
 
-  inline __attribute__((always_inline)) void solve(Lanes& bend, Lanes& spread) const {
-    spread = xx - x * x / w;
-    bend = (xs - x * s / w) / spread;
+  inline __attribute__((always_inline)) void add_slopes(float at_x, float at_y, const Lanes& weight,
+                                                        const Lanes& slope_x, const Lanes& slope_y) {
+    const Lanes of_x = weight * slope_x, of_y = weight * slope_y;
+    w += weight;
+    x[0] += weight * at_x, xx[0] += weight * (at_x * at_x), s[0] += of_x, xs[0] += of_x * at_x;
+    x[1] += weight * at_y, xx[1] += weight * (at_y * at_y), s[1] += of_y, xs[1] += of_y * at_y;
+  }
+  inline __attribute__((always_inline)) void add(const FuseSums& more) {
+    weights += more.weights, values += more.values, slopes_x += more.slopes_x, slopes_y += more.slopes_y;
+    squares += more.squares, expected += more.expected, count += more.count, w += more.w;
+    for (int axis = 0; axis < 2; ++axis) {
+      x[axis] += more.x[axis], xx[axis] += more.xx[axis];
+      s[axis] += more.s[axis], xs[axis] += more.xs[axis];
+    }
+  }
+  inline __attribute__((always_inline)) void bend(int axis, Lanes& bend, Lanes& spread) const {
+    spread = xx[axis] - x[axis] * x[axis] / w;
+    bend = (xs[axis] - x[axis] * s[axis] / w) / spread;
   }
 };
 
@@ -92,59 +123,46 @@ inline __attribute__((always_inline)) void take_noise_off(float overlap, const L
 // second order.
 inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& fused) {
   const Lanes zero{}, one = zero + 1;
-  Lanes own[7], beside = zero, beside_count = zero;
-  for (int k = 0; k < 7; ++k) load(in.around[k], own[k]);
-  struct Mean {
-    Lanes weights, values, slopes_x, slopes_y, squares, expected, count;
-  };
-  Mean means[kFuseReach];
-  for (Mean& mean : means) mean = {zero, zero, zero, zero, zero, zero, zero};
-  BendSums along[2][kFuseReach];  // both axes
-  for (auto& axis : along)
-    for (BendSums& sums : axis) sums = {zero, zero, zero, zero, zero};
+  Lanes own[kInputs], beside = zero, beside_count = zero;
+  for (int k = 0; k < kInputs; ++k) load(in.around[k], own[k]);
+  FuseSums rings[kFuseReach]{};  // first the nodes within a reach of one, then those around them
   const Lanes& px_per = own[kPxPer];
-  const Lanes own_noise = own[kNoisePx] * own[kNoisePx] + kFusePx * kFusePx;
+  const Lanes own_noise = own[kNoiseSquared] + kFusePx * kFusePx;
   for (int dy = -kFuseReach; dy <= kFuseReach; ++dy) {
     for (int dx = -kFuseReach; dx <= kFuseReach; ++dx) {
-      Lanes other[7];
-      for (int k = 0; k < 7; ++k) load(in.around[k] + dy * in.row + dx, other[k]);
+      Lanes other[kInputs];
+      for (int k = 0; k < kInputs; ++k) load(in.around[k] + dy * in.row + dx, other[k]);
       const float x = in.stride * static_cast<float>(dx), y = in.stride * static_cast<float>(dy);
       const Lanes apart = other[kInverseDepth] - own[kInverseDepth];
       const Lanes off =
           px_per * (apart - 0.5F * ((other[kSlopeX] + own[kSlopeX]) * x + (other[kSlopeY] + own[kSlopeY]) * y));
-      const Lanes of_slopes = 0.5F * (other[kSlopeNoise] + own[kSlopeNoise]);
-      const Lanes variance = other[kNoisePx] * other[kNoisePx] + of_slopes * of_slopes * (x * x + y * y);
-      const Lanes near = off * off < one ? other[kGood] : zero;
+      const Lanes of_slopes = 0.5F * (other[kSlopeNoise] + own[kSlopeNoise]), squared = off * off;
+      const Lanes variance = other[kNoiseSquared] + of_slopes * of_slopes * (x * x + y * y);
+      const Lanes near = squared < one ? other[kGood] : zero;
       if (std::abs(dx) + std::abs(dy) == 1) {
         const Lanes continued = px_per * (apart - other[kSlopeX] * x - other[kSlopeY] * y);
-        const Lanes by_noise = other[kNoisePx] * other[kNoisePx] + own[kNoisePx] * own[kNoisePx] +
-                               other[kSlopeNoise] * other[kSlopeNoise] * (x * x + y * y);
+        const Lanes by_noise =
+            other[kNoiseSquared] + own[kNoiseSquared] + other[kSlopeNoise] * other[kSlopeNoise] * (x * x + y * y);
         beside += near * (continued * continued - kOfNoise * by_noise), beside_count += near;
       }
-      const Lanes w = near / (other[kSlopeNoise] * other[kSlopeNoise] + 1e-8F);
-      const auto regress = [&](BendSums & sums, float at, const Lanes& slope) __attribute__((always_inline)) {
-        sums.w += w, sums.x += w * at, sums.xx += w * (at * at), sums.s += w * slope, sums.xs += w * at * slope;
-      };
-      const Lanes steep_x = px_per * other[kSlopeX], steep_y = px_per * other[kSlopeY];
       const Lanes expected = variance + own_noise;
-      const Lanes taken = off * off <= kFuseSigmas * kFuseSigmas * expected ? other[kGood] : zero;
+      const Lanes taken = squared <= kFuseSigmas * kFuseSigmas * expected ? other[kGood] : zero;
+      FuseSums& ring = rings[std::max({1, std::abs(dx), std::abs(dy)}) - 1];
+      ring.add_slopes(x, y, near * other[kInformation], px_per * other[kSlopeX], px_per * other[kSlopeY]);
       const Lanes weight = taken / (variance + kFusePx * kFusePx);
-      for (int reach = std::max({1, std::abs(dx), std::abs(dy)}); reach <= kFuseReach; ++reach) {
-        regress(along[0][reach - 1], x, steep_x), regress(along[1][reach - 1], y, steep_y);
-        Mean& mean = means[reach - 1];
-        mean.weights += weight, mean.values += weight * off;
-        mean.slopes_x += weight * other[kSlopeX], mean.slopes_y += weight * other[kSlopeY];
-        mean.squares += taken * off * off, mean.expected += taken * expected, mean.count += taken;
-      }
+      ring.weights += weight, ring.values += weight * off;
+      ring.slopes_x += weight * other[kSlopeX], ring.slopes_y += weight * other[kSlopeY];
+      ring.squares += taken * squared, ring.expected += taken * expected, ring.count += taken;
     }
   }
+  for (int reach = 1; reach < kFuseReach; ++reach) rings[reach].add(rings[reach - 1]);
   // A plane fitted to a window lies off a bent surface by half the bend times the mean squared distance from the
   // window's centre. Widely spaced slopes underestimate short waves more than close ones do; extrapolating from both
   // removes the loss. If noise hides that, use the bend of the wider regression, which covers long waves.
   Lanes lift = zero;
-  for (const auto& axis : along) {
+  for (int axis = 0; axis < 2; ++axis) {
     Lanes near, wide, near_spread, wide_spread;
-    axis[0].solve(near, near_spread), axis[1].solve(wide, wide_spread);
+    rings[0].bend(axis, near, near_spread), rings[1].bend(axis, wide, wide_spread);
     near += in.beyond * (near - wide);
     take_noise_off(kOverlap[0] * (1 + in.beyond) * (1 + in.beyond), near_spread, near);
     take_noise_off(kOverlap[1], wide_spread, wide);
@@ -156,7 +174,7 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
   fused.more = any * (lift * lift + in.of_disagreement * in.of_disagreement * beside / (beside_count + (one - any)));
   fused.left = one, fused.off = zero, fused.slope_x = own[kSlopeX], fused.slope_y = own[kSlopeY];
   for (int reach = 1; reach <= kFuseReach; ++reach) {
-    const Mean& mean = means[reach - 1];
+    const FuseSums& mean = rings[reach - 1];
     const auto all = static_cast<float>((2 * reach + 1) * (2 * reach + 1));
     const IntLanes holds = (2 * mean.count > zero + all) & (mean.squares < kFuseExcess * kFuseExcess * mean.expected) &
                            (lift * lift < kFlat * kFlat * own_noise);
@@ -169,29 +187,44 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
   fused.off -= lift;
 }
 
+/// Sums a square of nodes around each of eight.
+inline __attribute__((always_inline)) void sum_squares(const float* middle, std::ptrdiff_t row, float* to) {
+  Lanes sum{};
+  for (int dy = -kFuseReach; dy <= kFuseReach; ++dy) {
+    for (int dx = -kFuseReach; dx <= kFuseReach; ++dx) {
+      Lanes more;
+      load(middle + dy * row + dx, more);
+      sum += more;
+    }
+  }
+  std::memcpy(to, &sum, sizeof sum);
+}
+
 }  // namespace
 
 void SurfaceGrid::fuse(Executor& executor) {
   // The data of all nodes, one quantity after the other, with a border of nodes that are not good.
   const std::size_t row = static_cast<std::size_t>(columns_) + 2 * kFuseReach + kLanes,
                     plane = row * (static_cast<std::size_t>(rows_) + 2 * kFuseReach);
-  if (around_.size() != 8 * plane) around_.assign(8 * plane, 0);
+  if (around_.size() != kNumbers * plane) around_.assign(kNumbers * plane, 0);
   const auto place = [&](int at_row, int column, int what) {
     return around_.data() + what * plane + (static_cast<std::size_t>(at_row) + kFuseReach) * row + column + kFuseReach;
   };
   executor.run(rows_, [&](int at_row, int) {
     const SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
+    float* const first = place(at_row, 0, 0);
     for (int column = 0; column < columns_; ++column) {
       const SurfaceNode& node = nodes[column];
-      const float values[7] = {node.plane.inverse_depth,
-                               node.plane.slope_x,
-                               node.plane.slope_y,
-                               1 / node.per_px,
-                               node.noise_px,
-                               node.slope_noise,
-                               1};
-      for (int k = 0; k < 7; ++k) *place(at_row, column, k) = node.good ? values[k] : 0;
-      *place(at_row, column, kVariance) = 0;
+      const float values[kNumbers] = {node.plane.inverse_depth,
+                                      node.plane.slope_x,
+                                      node.plane.slope_y,
+                                      1 / node.per_px,
+                                      node.noise_px * node.noise_px,
+                                      node.slope_noise,
+                                      1 / (node.slope_noise * node.slope_noise + 1e-8F),
+                                      1,
+                                      0};
+      for (int k = 0; k < kNumbers; ++k) first[k * plane + column] = node.good ? values[k] : 0;
     }
   });
   const auto side = static_cast<float>(options_.window_px), stride = static_cast<float>(options_.stride_px);
@@ -212,7 +245,7 @@ void SurfaceGrid::fuse(Executor& executor) {
       const int count = std::min(kLanes, columns_ - column);
       if (std::none_of(nodes + column, nodes + column + count, [](const SurfaceNode& node) { return node.good; }))
         continue;
-      for (int k = 0; k < 7; ++k) fusing.around[k] = place(at_row, column, k);
+      for (int k = 0; k < kInputs; ++k) fusing.around[k] = place(at_row, column, k);
       Fused fused;
       Cloned<fuse_lanes>::call(fusing, fused);
       for (int lane = 0; lane < count; ++lane) {
@@ -228,16 +261,17 @@ void SurfaceGrid::fuse(Executor& executor) {
   // A node's own variance comes from few numbers and is itself uncertain: average it with those around it.
   executor.run(rows_, [&](int at_row, int) {
     SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;
-    for (int column = 0; column < columns_; ++column) {
-      if (!nodes[column].good) continue;
-      float sum = 0, count = 0;
-      for (int dy = -2; dy <= 2; ++dy) {
-        const float *variance = place(at_row + dy, column, kVariance), *good = place(at_row + dy, column, kGood);
-        for (int dx = -2; dx <= 2; ++dx) sum += variance[dx], count += good[dx];
+    for (int first = 0; first < columns_; first += kLanes) {
+      float sums[kLanes], counts[kLanes];
+      Cloned<sum_squares>::call(place(at_row, first, kVariance), static_cast<std::ptrdiff_t>(row), sums);
+      Cloned<sum_squares>::call(place(at_row, first, kGood), static_cast<std::ptrdiff_t>(row), counts);
+      for (int column = first; column < std::min(columns_, first + kLanes); ++column) {
+        if (!nodes[column].good) continue;
+        const float off = epipolar_.at({static_cast<float>(x_of(column)), static_cast<float>(y_of(at_row))});
+        const float unknown = std::max(0.F, std::abs(off) - kUsualOffsetPx);
+        nodes[column].sigma_px =
+            std::sqrt(sums[column - first] / counts[column - first] + unknown * unknown + kFloorPx * kFloorPx);
       }
-      const float off = epipolar_.at({static_cast<float>(x_of(column)), static_cast<float>(y_of(at_row))});
-      const float unknown = std::max(0.F, std::abs(off) - kUsualOffsetPx);
-      nodes[column].sigma_px = std::sqrt(sum / count + unknown * unknown + kFloorPx * kFloorPx);
     }
   });
 }
