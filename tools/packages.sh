@@ -24,12 +24,13 @@ site_packages=(python3 python3-markdown mandoc)
 lint_packages=(git clang-format clang-tidy shellcheck)
 fuzz_packages=(clang libclang-rt-14-dev)
 coverage_packages=(gcovr)
+profile_packages=("${build_packages[@]}" linux-perf python3)
 package_packages=(build-essential debhelper dh-python dpkg-dev lintian)
 machine_packages=(mmdebstrap systemd-container util-linux python3)
 guest_packages=(qemu-system-x86 busybox-static cpio kmod e2fsprogs)
 arm64_packages=(g++-aarch64-linux-gnu qemu-user)
 all_packages=("${build_packages[@]}" "${test_packages[@]}" "${lint_packages[@]}" "${fuzz_packages[@]}"
-  "${coverage_packages[@]}" "${package_packages[@]}" "${machine_packages[@]}" "${guest_packages[@]}"
+  "${coverage_packages[@]}" "${profile_packages[@]}" "${package_packages[@]}" "${machine_packages[@]}" "${guest_packages[@]}"
   "${arm64_packages[@]}")
 
 # room_packages ROOM: prints what the room needs besides core_packages.
