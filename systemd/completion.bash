@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-# Completion of slsd, slsctl, slsd-web, slsd-tcp and slsd-dds for bash. Commands, options and values are those of the programs' own --help.
+# Completion of slsd, slsctl, slsd-web, slsd-tcp, slsd-dds and slsd-model for bash. Commands, options and values are those of the programs' own --help.
 
 _slsd() {
   local program=$1 current=$2 previous=$3 command='' word help values=''
@@ -23,4 +23,4 @@ _slsd() {
   fi
   mapfile -t COMPREPLY < <(compgen -W "$values" -- "$current")
 }
-complete -o default -F _slsd slsd slsctl slsd-web slsd-tcp slsd-dds
+complete -o default -F _slsd slsd slsctl slsd-web slsd-tcp slsd-dds slsd-model

@@ -30,6 +30,7 @@ BELOW = {
     "clients/web": BASE | PROTOCOL | {"clients/cpp", "clients/usage", "clients/access", "clients/connection",
                                       "clients/slsctl"},
     "clients/tcp": BASE | PROTOCOL | {"clients/cpp", "clients/usage", "clients/access"},
+    "clients/model": BASE | PROTOCOL | {"clients/cpp", "clients/usage", "clients/connection"},
     "clients/dds": BASE | {"clients/cpp", "clients/usage"},
     "programs/latency": BASE | {"daemon/configuration"},
     "programs/calibrate": BASE | {"daemon/configuration", "daemon/scan", "daemon/rpc", "clients/cpp",

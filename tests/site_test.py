@@ -15,7 +15,7 @@ import unittest
 SOURCE = pathlib.Path(__file__).resolve().parents[1]
 BIN = pathlib.Path(os.environ["SLSD_BIN"])
 MAKER = SOURCE / "docs" / "site" / "make_site.py"
-MANUAL = {"slsctl": "slsctl.1", "slsd": "slsd.8", "slsd-web": "slsd-web.8", "slsd-tcp": "slsd-tcp.8", "slsd-dds": "slsd-dds.1"}
+MANUAL = {"slsctl": "slsctl.1", "slsd": "slsd.8", "slsd-web": "slsd-web.8", "slsd-tcp": "slsd-tcp.8", "slsd-dds": "slsd-dds.1", "slsd-model": "slsd-model.1"}
 COMMANDS = re.compile(r"(?m)^  ([a-z]+)  ")  # in groups; options begin with dashes
 OPTIONS = re.compile(r"(?<![\w-])(--[a-z][a-z-]*[a-z])")
 

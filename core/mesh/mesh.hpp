@@ -17,6 +17,7 @@ struct Mesh {
   // For each vertex, or empty:
   std::vector<float> sigma_mm;          ///< one standard deviation
   std::vector<std::uint8_t> intensity;  ///< 0 to 255
+  std::vector<std::uint16_t> frames;    ///< how many frames measured it
 };
 
 }  // namespace slsd

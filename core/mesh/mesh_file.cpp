@@ -43,13 +43,15 @@ std::string write_ply_mesh(const Mesh& mesh, std::string_view title) {
                       "\nproperty float x\nproperty float y\nproperty float z\n";
   if (!mesh.sigma_mm.empty()) bytes += "property float sigma_mm\n";
   if (!mesh.intensity.empty()) bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (!mesh.frames.empty()) bytes += "property ushort frames\n";
   bytes += "element face " + std::to_string(mesh.triangles.size()) +
            "\nproperty list uchar int vertex_indices\nend_header\n";
-  bytes.reserve(bytes.size() + mesh.vertices_mm.size() * 19 + mesh.triangles.size() * 13);
+  bytes.reserve(bytes.size() + mesh.vertices_mm.size() * 21 + mesh.triangles.size() * 13);
   for (std::size_t i = 0; i < mesh.vertices_mm.size(); ++i) {
     put(bytes, mesh.vertices_mm[i]);
     if (!mesh.sigma_mm.empty()) put(bytes, mesh.sigma_mm[i]);
     if (!mesh.intensity.empty()) bytes.append(3, static_cast<char>(mesh.intensity[i]));
+    if (!mesh.frames.empty()) put(bytes, mesh.frames[i]);
   }
   for (const Triangle& triangle : mesh.triangles) {
     bytes += '\3';

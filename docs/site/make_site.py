@@ -16,7 +16,7 @@ SOURCE = pathlib.Path(__file__).resolve().parents[2]
 PAGES = {
     "Begin": {"README.md": "slsd", "docs/installing.md": "Installing", "docs/hardware.md": "Cameras", "docs/projector.md": "Projector",
               "docs/calibration.md": "Calibrating", "docs/page.md": "The page"},
-    "Use": {"docs/tasks.md": "Tasks", "docs/configuration.md": "Configuration", "docs/dense.md": "Dense clouds", "docs/formats.md": "File formats",
+    "Use": {"docs/tasks.md": "Tasks", "docs/configuration.md": "Configuration", "docs/dense.md": "Dense clouds", "docs/model.md": "Models", "docs/formats.md": "File formats",
             "docs/protocol.md": "Protocol", "clients/python/README.md": "Python", "clients/cpp/README.md": "C++",
             "docs/examples.md": "Examples", "docs/controllers.md": "Controllers", "docs/ros.md": "ROS 2", "clients/ros/README.md": "ROS 2 launch file",
             "docs/fleet.md": "Many scanners"},

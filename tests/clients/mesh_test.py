@@ -25,7 +25,7 @@ def mesh_ply(bytes_):
     header, body = bytes_.split(b"end_header\n", 1)
     lines = [line.split() for line in header.decode().split("\n")]
     vertices, faces = (int(line[2]) for line in lines if line[:1] == ["element"])
-    layout = np.dtype([(line[2], {"float": "<f4", "uchar": "u1"}[line[1]]) for line in lines
+    layout = np.dtype([(line[2], {"float": "<f4", "uchar": "u1", "ushort": "<u2"}[line[1]]) for line in lines
                        if line[:1] == ["property"] and line[1] != "list"])
     points = np.frombuffer(body, layout, vertices)
     triangles = np.frombuffer(body[vertices * layout.itemsize:], np.dtype([("count", "u1"), ("corners", "<i4", 3)]))

@@ -21,7 +21,7 @@ import time
 import instances
 from machine import Container
 
-NAMES = ("slsd", "slsd-client", "slsd-calibrate", "slsd-display", "slsd-web", "slsd-tcp", "slsd-dds", "libslsd-dev", "python3-slsd")
+NAMES = ("slsd", "slsd-client", "slsd-calibrate", "slsd-display", "slsd-web", "slsd-tcp", "slsd-dds", "slsd-model", "libslsd-dev", "python3-slsd")
 # What dpkg, the loader and the tools of users keep for themselves, whatever is installed.
 KEPT_BY_OTHERS = ("proc", "sys", "dev", "tmp", "packages", "var/lib/dpkg", "var/log", "var/cache", "etc/ld.so.cache", "etc/passwd-", "etc/group-",
                   "etc/shadow-", "etc/gshadow-", "etc/.pwd.lock", "etc/subuid-", "etc/subgid-", "var/lib/systemd/catalog", "run/lock", "usr/share/mime",

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "clients/model/read_cloud.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <string>
+
+#include <fmt/format.h>
+
+namespace slsd::model {
+namespace {
+
+/// Offsets of a record's fields.
+struct CloudLayout {
+  static constexpr std::array<std::string_view, 6> kNames{"x", "y", "z", "sigma_mm", "intensity", "camera"};
+  std::array<std::optional<std::size_t>, kNames.size()> offsets;
+  std::size_t record_bytes = 0, points = 0;
+  bool symbols = false;
+};
+
+/// The text before a mark, which both leave `text`; nothing if there is no mark.
+std::optional<std::string_view> take_until(std::string_view& text, char mark) {
+  const std::size_t end = text.find(mark);
+  if (end == std::string_view::npos) return std::nullopt;
+  const std::string_view taken = text.substr(0, end);
+  text.remove_prefix(end + 1);
+  return taken;
+}
+
+bool add_property(CloudLayout& layout, std::string_view type_and_name) {
+  const auto type = take_until(type_and_name, ' ');
+  if (!type || (*type != "float" && *type != "uchar")) return false;
+  const std::size_t field =
+      static_cast<std::size_t>(std::ranges::find(CloudLayout::kNames, type_and_name) - CloudLayout::kNames.begin());
+  constexpr std::size_t kFloats = 4;
+  if (field < CloudLayout::kNames.size()) {
+    if ((field < kFloats) != (*type == "float")) return false;
+    layout.offsets[field] = layout.record_bytes;
+  }
+  layout.symbols = layout.symbols || type_and_name == "symbol";
+  layout.record_bytes += *type == "float" ? 4 : 1;
+  return true;
+}
+
+bool read_number(std::string_view text, std::size_t& number) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+/// Takes the header from the bytes.
+std::optional<CloudLayout> take_header(std::string_view& bytes) {
+  constexpr std::string_view kVertices = "element vertex ", kProperty = "property ";
+  if (take_until(bytes, '\n') != "ply" || take_until(bytes, '\n') != "format binary_little_endian 1.0")
+    return std::nullopt;
+  CloudLayout layout;
+  while (const auto line = take_until(bytes, '\n')) {
+    if (*line == "end_header") return layout;
+    if (line->starts_with(kVertices) && !read_number(line->substr(kVertices.size()), layout.points))
+      return std::nullopt;
+    // Properties of symbols may have other types.
+    if (line->starts_with(kProperty) && !add_property(layout, line->substr(kProperty.size())) && !layout.symbols)
+      return std::nullopt;
+  }
+  return std::nullopt;
+}
+
+template <class Number>
+Number number_at(const char* record, std::size_t offset) {
+  Number number;
+  std::memcpy(&number, record + offset, sizeof number);
+  return number;
+}
+
+}  // namespace
+
+Result<std::vector<MeasuredPoint>> read_cloud(std::string_view bytes) {
+  const auto layout = take_header(bytes);
+  if (!layout) return fail(ErrorCode::kMalformed, "is not a cloud that slsd wrote as PLY");
+  if (layout->symbols)
+    return fail(ErrorCode::kUnsupported,
+                "has a point for each symbol; a model needs one for each pixel: set [decode] density = \"pixels\" in "
+                "slsd.toml, and record again");
+  const bool complete = std::ranges::all_of(layout->offsets, [](const auto& offset) { return offset.has_value(); });
+  if (!complete) return fail(ErrorCode::kMalformed, "is not a dense cloud: it lacks sigma_mm, intensity or camera");
+  if (bytes.size() / layout->record_bytes < layout->points)
+    return fail(ErrorCode::kMalformed,
+                fmt::format("is cut: it has {} of {} points", bytes.size() / layout->record_bytes, layout->points));
+  std::vector<MeasuredPoint> points;
+  points.reserve(layout->points);
+  for (std::size_t i = 0; i < layout->points; ++i) {
+    const char* const record = bytes.data() + i * layout->record_bytes;
+    MeasuredPoint point;
+    for (int axis = 0; axis < 3; ++axis) point.place_mm[axis] = number_at<float>(record, *layout->offsets[axis]);
+    point.sigma_mm = number_at<float>(record, *layout->offsets[3]);
+    point.intensity = number_at<std::uint8_t>(record, *layout->offsets[4]);
+    point.camera = number_at<std::uint8_t>(record, *layout->offsets[5]);
+    if (!point.place_mm.allFinite() || !(point.sigma_mm > 0) || !std::isfinite(point.sigma_mm))
+      return fail(ErrorCode::kMalformed, fmt::format("point {} has no place or no sigma", i));
+    points.push_back(point);
+  }
+  return points;
+}
+
+}  // namespace slsd::model

@@ -1,0 +1,337 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "clients/model/volume.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include <openvdb/openvdb.h>
+#include <openvdb/tools/VolumeToMesh.h>
+#include <tbb/parallel_for.h>
+#include <Eigen/Geometry>
+
+namespace slsd::model {
+namespace {
+
+using openvdb::Coord;
+using FloatLeaf = openvdb::FloatTree::LeafNodeType;
+using FactsLeaf = openvdb::Int32Tree::LeafNodeType;
+
+constexpr int kLeafSide = 8;
+/// A voxel that more frames saw through than measured is empty.
+constexpr unsigned kSeenThrough = 1;
+
+/// Besides its distance and weight, what is known of a voxel.
+struct VoxelFacts {
+  unsigned measured = 0;   ///< frames that have a surface near it
+  unsigned passed = 0;     ///< frames whose light passed through it
+  unsigned intensity = 0;  ///< mean, 0 to 255
+
+  static constexpr unsigned kMost = 0xfff;
+  static VoxelFacts of(std::int32_t packed) {
+    const auto bits = static_cast<std::uint32_t>(packed);
+    return {bits & kMost, bits >> 12 & kMost, bits >> 24};
+  }
+  [[nodiscard]] std::int32_t packed() const {
+    return static_cast<std::int32_t>(std::min(measured, kMost) | std::min(passed, kMost) << 12 | intensity << 24);
+  }
+  [[nodiscard]] bool empty() const { return passed > kSeenThrough * measured; }
+};
+
+/// A voxel's place on a surface: the plane of the pixel that sees it.
+struct PixelPlane {
+  Eigen::Vector3f place, normal;  // camera's frame
+  float sigma_mm = 0;             // along the normal; 0: no surface
+};
+
+/// One camera's surface, ready to be looked up.
+class SurfaceLookup {
+ public:
+  SurfaceLookup(const SurfaceView& view, const RigidTransform& object_from_rig)
+      : image_(view.image), planes_(view.image.depth_mm.size()) {
+    const RigidTransform camera_from_object = view.image.camera_from_rig.after(object_from_rig.inverse());
+    rotation_ = camera_from_object.rotation.cast<float>(), translation_ = camera_from_object.translation.cast<float>();
+    const Eigen::Matrix3f camera_rotation = view.image.camera_from_rig.rotation.cast<float>();
+    for (int y = 0; y < image_.height; ++y) {
+      for (int x = 0; x < image_.width; ++x) {
+        const std::size_t pixel = image_.index(x, y);
+        if (std::isnan(image_.depth_mm[pixel])) continue;
+        const Eigen::Vector2d ray = image_.lens.undistort(Eigen::Vector2d(x + image_.left, y + image_.top));
+        const Eigen::Vector3f unit = ray.homogeneous().cast<float>();
+        const SurfaceCell* const cell =
+            cell_near(view.levels.back(), x, y,
+                      view.image.camera_from_rig.inverse() * (unit * image_.depth_mm[pixel]).cast<double>());
+        if (!cell) continue;
+        const Eigen::Vector3f normal = camera_rotation * cell->normal;
+        const float cosine = -normal.dot(unit) / unit.norm();
+        planes_[pixel] = {unit * image_.depth_mm[pixel], normal, image_.sigma_mm[pixel] * std::max(cosine, 0.1F)};
+      }
+    }
+  }
+
+  [[nodiscard]] const RangeImage& image() const { return image_; }
+  [[nodiscard]] Eigen::Vector3f in_camera(const Eigen::Vector3f& in_object) const {
+    return rotation_ * in_object + translation_;
+  }
+  [[nodiscard]] const Eigen::Matrix3f& rotation() const { return rotation_; }
+  /// The plane of the pixel that sees this place; nothing if it measured none.
+  [[nodiscard]] const PixelPlane* at(const Eigen::Vector3f& place) const {
+    const Eigen::Vector2f pixel = image_.pixel_of(place);
+    const float x = pixel.x() + 0.5F, y = pixel.y() + 0.5F;
+    if (!(x >= 0 && y >= 0 && x < static_cast<float>(image_.width) && y < static_cast<float>(image_.height)))
+      return nullptr;
+    const PixelPlane& plane = planes_[image_.index(static_cast<int>(x), static_cast<int>(y))];
+    return plane.sigma_mm > 0 ? &plane : nullptr;
+  }
+  [[nodiscard]] std::uint8_t intensity_of(const PixelPlane& plane) const {
+    return image_.intensity[static_cast<std::size_t>(&plane - planes_.data())];
+  }
+  /// Calls visit(place in the object's frame) along the ray of every second measured pixel, within the band.
+  template <class Visit>
+  void visit_band(float band_mm, float step_mm, Visit&& visit) const {
+    const Eigen::Matrix3f back = rotation_.transpose();
+    for (int y = 0; y < image_.height; y += 2) {
+      for (int x = y / 2 % 2; x < image_.width; x += 2) {
+        const PixelPlane& plane = planes_[image_.index(x, y)];
+        if (!(plane.sigma_mm > 0)) continue;
+        for (float along = -band_mm; along < band_mm + step_mm; along += step_mm)
+          visit(Eigen::Vector3f(back * (plane.place + std::min(along, band_mm) * plane.normal - translation_)));
+      }
+    }
+  }
+
+ private:
+  /// The pixel's cell; where that has no plane, the nearest of the cells around it.
+  static const SurfaceCell* cell_near(const CellGrid& grid, int x, int y, const Eigen::Vector3d& place) {
+    const auto at = [&](int right, int down) {
+      return grid.at(static_cast<float>(x + right * grid.step), static_cast<float>(y + down * grid.step));
+    };
+    if (const SurfaceCell* const own = at(0, 0)) return own;
+    const SurfaceCell* nearest = nullptr;
+    float least = 0.01F * static_cast<float>(place.z());
+    for (int down = -1; down <= 1; ++down) {
+      for (int right = -1; right <= 1; ++right) {
+        const SurfaceCell* const cell = at(right, down);
+        const float distance = cell ? (cell->place_mm - place.cast<float>()).norm() : least;
+        if (distance < least) nearest = cell, least = distance;
+      }
+    }
+    return nearest;
+  }
+
+  const RangeImage& image_;
+  Eigen::Matrix3f rotation_;
+  Eigen::Vector3f translation_;
+  std::vector<PixelPlane> planes_;
+};
+
+struct Leaves {
+  FloatLeaf* distance;
+  FloatLeaf* weight;
+  FactsLeaf* facts;
+};
+
+/// Adds what a surface says of one voxel.
+void add_to_voxel(const Leaves& leaves, openvdb::Index at, const SurfaceLookup& surface, const Eigen::Vector3f& place,
+                  float band_mm) {
+  const PixelPlane* const plane = surface.at(place);
+  if (!plane) return;
+  const float before_mm = plane->place.z() - place.z();  // along the camera's axis
+  const float off_mm = plane->normal.dot(place - plane->place);
+  if (off_mm < -band_mm || before_mm < -3 * band_mm) return;  // hidden
+  VoxelFacts facts = VoxelFacts::of(leaves.facts->getValue(at));
+  if (off_mm > band_mm || before_mm > 3 * band_mm) {
+    facts.passed += facts.passed < VoxelFacts::kMost ? 1 : 0;
+  } else {
+    // Deep below the surface, another side of the object may be nearer.
+    const float depth_share = std::clamp(2 + 2 * off_mm / band_mm, 0.0F, 1.0F);
+    const float weight = depth_share / (plane->sigma_mm * plane->sigma_mm);
+    const float before = leaves.weight->getValue(at), sum = before + weight;
+    if (!(sum > 0)) return;
+    const float share = weight / sum;
+    const float mean = before > 0 ? leaves.distance->getValue(at) : 0;
+    leaves.distance->setValueOn(at, mean + share * (off_mm - mean));
+    leaves.weight->setValueOn(at, sum);
+    const float level = static_cast<float>(facts.intensity);
+    facts.intensity =
+        static_cast<unsigned>(std::lround(level + share * (static_cast<float>(surface.intensity_of(*plane)) - level)));
+    facts.measured += facts.measured < VoxelFacts::kMost ? 1 : 0;
+  }
+  leaves.facts->setValueOn(at, facts.packed());
+}
+
+void add_to_leaf(const Leaves& leaves, const SurfaceLookup& surface, const VolumeOptions& options) {
+  const Coord& origin = leaves.distance->origin();
+  const Eigen::Vector3f corner = surface.in_camera(
+      Eigen::Vector3f(static_cast<float>(origin.x()), static_cast<float>(origin.y()), static_cast<float>(origin.z())) *
+      options.voxel_mm);
+  const Eigen::Matrix3f step = surface.rotation() * options.voxel_mm;
+  if (!(corner.z() > kLeafSide * 2 * options.voxel_mm)) return;
+  const Eigen::Vector3f middle = corner + step * Eigen::Vector3f::Constant(kLeafSide / 2.0F);
+  const Eigen::Vector2f pixel = surface.image().pixel_of(middle);
+  const float radius = kLeafSide * options.voxel_mm / middle.z() *
+                       static_cast<float>(std::max(surface.image().lens.fx, surface.image().lens.fy));
+  if (pixel.x() < -radius || pixel.y() < -radius || pixel.x() > static_cast<float>(surface.image().width) + radius ||
+      pixel.y() > static_cast<float>(surface.image().height) + radius)
+    return;
+  for (int i = 0; i < kLeafSide; ++i)
+    for (int j = 0; j < kLeafSide; ++j)
+      for (int k = 0; k < kLeafSide; ++k)
+        add_to_voxel(
+            leaves, FloatLeaf::coordToOffset(Coord(i, j, k)), surface,
+            corner + step * Eigen::Vector3f(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)),
+            options.band_mm);
+}
+
+}  // namespace
+
+struct Volume::Grids {
+  openvdb::FloatGrid distance, weight;
+  openvdb::Int32Grid facts;
+
+  [[nodiscard]] Leaves touch(const Coord& at) {
+    return {distance.tree().touchLeaf(at), weight.tree().touchLeaf(at), facts.tree().touchLeaf(at)};
+  }
+  [[nodiscard]] std::vector<Leaves> leaves() {
+    std::vector<Leaves> all;
+    for (auto leaf = distance.tree().beginLeaf(); leaf; ++leaf) all.push_back(touch(leaf->origin()));
+    return all;
+  }
+};
+
+Volume::Volume(const VolumeOptions& options) : options_(options) {
+  openvdb::initialize();
+  grids_ = std::make_unique<Grids>();
+}
+Volume::Volume(Volume&&) noexcept = default;
+Volume& Volume::operator=(Volume&&) noexcept = default;
+Volume::~Volume() = default;
+
+std::size_t Volume::voxels() const {
+  return grids_->weight.activeVoxelCount();
+}
+std::size_t Volume::bytes() const {
+  return grids_->distance.memUsage() + grids_->weight.memUsage() + grids_->facts.memUsage();
+}
+
+void Volume::add(const Shot& shot, const RigidTransform& object_from_rig) {
+  for (const SurfaceView& view : shot.views) {
+    const SurfaceLookup surface(view, object_from_rig);
+    Coord last(std::numeric_limits<int>::max());
+    surface.visit_band(options_.band_mm, kLeafSide * options_.voxel_mm / 2, [&](const Eigen::Vector3f& place) {
+      const Eigen::Vector3f voxel = place / options_.voxel_mm;
+      const Coord at(static_cast<int>(std::lround(voxel.x())), static_cast<int>(std::lround(voxel.y())),
+                     static_cast<int>(std::lround(voxel.z())));
+      const Coord origin = at & ~(kLeafSide - 1);
+      if (origin == last) return;
+      last = origin;
+      static_cast<void>(grids_->touch(origin));
+    });
+    const std::vector<Leaves> leaves = grids_->leaves();
+    tbb::parallel_for(std::size_t{0}, leaves.size(), [&](std::size_t i) { add_to_leaf(leaves[i], surface, options_); });
+  }
+}
+
+namespace {
+
+/// The voxels around a place, and how much each counts.
+struct Corner {
+  Coord at;
+  float share;
+};
+std::array<Corner, 8> corners_of(const Eigen::Vector3f& voxel) {
+  const Eigen::Vector3f low = voxel.array().floor(), part = voxel - low;
+  std::array<Corner, 8> corners;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3i up(i & 1, i >> 1 & 1, i >> 2 & 1);
+    const Eigen::Vector3f share =
+        up.cast<float>().cwiseProduct(part) +
+        (Eigen::Vector3f::Ones() - up.cast<float>()).cwiseProduct(Eigen::Vector3f::Ones() - part);
+    const Eigen::Vector3i at = low.cast<int>() + up;
+    corners[static_cast<std::size_t>(i)] = {Coord(at.x(), at.y(), at.z()), share.prod()};
+  }
+  return corners;
+}
+
+/// Reads what was measured around vertices.
+class VertexReader {
+ public:
+  VertexReader(const openvdb::FloatGrid& weight, const openvdb::Int32Grid& facts, unsigned fewest_frames)
+      : weight_(weight.getConstAccessor()), facts_(facts.getConstAccessor()), fewest_frames_(fewest_frames) {}
+
+  struct Vertex {
+    float sigma_mm, frames, intensity;
+  };
+  /// Nothing if the voxels around it were not all measured.
+  [[nodiscard]] std::optional<Vertex> read(const Eigen::Vector3f& voxel) {
+    float weights = 0, frames = 0, intensity = 0;
+    for (const Corner& corner : corners_of(voxel)) {
+      const VoxelFacts facts = VoxelFacts::of(facts_.getValue(corner.at));
+      if (facts.measured < fewest_frames_ || facts.empty()) return std::nullopt;
+      weights += corner.share * weight_.getValue(corner.at);
+      frames += corner.share * static_cast<float>(facts.measured);
+      intensity += corner.share * static_cast<float>(facts.intensity);
+    }
+    return Vertex{1 / std::sqrt(weights), frames, intensity};
+  }
+
+ private:
+  openvdb::FloatGrid::ConstAccessor weight_;
+  openvdb::Int32Grid::ConstAccessor facts_;
+  unsigned fewest_frames_;
+};
+
+}  // namespace
+
+Mesh Volume::mesh() const {
+  // Outside of the band is far outside: what is not measured must have one sign.
+  openvdb::FloatGrid field(options_.band_mm);
+  for (auto leaf = grids_->distance.tree().cbeginLeaf(); leaf; ++leaf) {
+    const FactsLeaf* const facts = grids_->facts.tree().probeConstLeaf(leaf->origin());
+    FloatLeaf* const to = field.tree().touchLeaf(leaf->origin());
+    for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel)
+      if (!VoxelFacts::of(facts->getValue(voxel.pos())).empty()) to->setValueOn(voxel.pos(), *voxel);
+  }
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec4I> quads;
+  openvdb::tools::volumeToMesh(field, points, quads);
+
+  Mesh mesh;
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> kept(points.size(), kNone);
+  VertexReader reader(grids_->weight, grids_->facts, options_.fewest_frames);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f voxel(points[i].x(), points[i].y(), points[i].z());
+    const auto vertex = reader.read(voxel);
+    if (!vertex) continue;
+    kept[i] = static_cast<std::uint32_t>(mesh.vertices_mm.size());
+    mesh.vertices_mm.push_back(voxel * options_.voxel_mm);
+    mesh.sigma_mm.push_back(vertex->sigma_mm);
+    mesh.frames.push_back(static_cast<std::uint16_t>(std::lround(vertex->frames)));
+    mesh.intensity.push_back(static_cast<std::uint8_t>(std::lround(vertex->intensity)));
+  }
+  for (const openvdb::Vec4I& quad : quads) {
+    std::array<std::uint32_t, 4> corner;
+    for (int i = 0; i < 4; ++i) corner[static_cast<std::size_t>(i)] = kept[quad[i]];
+    if (std::ranges::find(corner, kNone) != corner.end()) continue;
+    const auto length = [&](int from, int to) {
+      return (mesh.vertices_mm[corner[static_cast<std::size_t>(from)]] -
+              mesh.vertices_mm[corner[static_cast<std::size_t>(to)]])
+          .squaredNorm();
+    };
+    if (length(0, 2) < length(1, 3)) {
+      mesh.triangles.push_back({corner[0], corner[1], corner[2]});
+      mesh.triangles.push_back({corner[0], corner[2], corner[3]});
+    } else {
+      mesh.triangles.push_back({corner[0], corner[1], corner[3]});
+      mesh.triangles.push_back({corner[1], corner[2], corner[3]});
+    }
+  }
+  return mesh;
+}
+
+}  // namespace slsd::model

@@ -1,0 +1,226 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""slsd-model on a recording of an object that numpy computes: what assimp and numpy read of its mesh, beside the truth."""
+import json
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent / "daemon"))
+
+import numpy as np  # noqa: E402
+
+from mesh_test import mesh_ply  # noqa: E402
+
+PROGRAM = pathlib.Path(os.environ["SLSD_BIN"]) / "slsd-model"
+WIDTH, HEIGHT, FOCUS = 220, 200, 1000.0
+MIDDLE = np.array([0, 0, 600.0])
+STEP_DEGREES, SIGMA_MM, ALIKE_PX = 12, 0.05, 6
+
+
+def bumpy_ball(at):
+    """Signed distance to a ball of 50 mm with bumps of up to 5 mm, scaled so that rays can step by it."""
+    x, y, z = at.T
+    bumps = (np.sin(0.07 * x + 1) * np.sin(0.09 * y) + 0.6 * np.sin(0.11 * z + 2)
+             + 0.4 * np.sin(0.15 * x - 0.05 * z) * np.cos(0.13 * y + 1))
+    return 0.7 * (np.linalg.norm(at, axis=1) - 50 - 2.5 * bumps)
+
+
+def smooth_ball(at):
+    return np.linalg.norm(at, axis=1) - 50
+
+
+def turn(degrees):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+
+
+def errors(random):
+    """Of sigma 1, alike over some pixels as those of dense clouds."""
+    coarse = random.standard_normal((HEIGHT // ALIKE_PX + 2, WIDTH // ALIKE_PX + 2))
+    v, u = np.mgrid[:HEIGHT, :WIDTH] / ALIKE_PX
+    i, j = v.astype(int), u.astype(int)
+    v, u = v - i, u - j
+    weights = ((1 - v) * (1 - u), (1 - v) * u, v * (1 - u), v * u)
+    places = ((i, j), (i, j + 1), (i + 1, j), (i + 1, j + 1))
+    return sum(w * coarse[place] for w, place in zip(weights, places)) / np.sqrt(sum(w * w for w in weights))
+
+
+def cloud(distance, degrees, seed):
+    """A dense cloud as PLY."""
+    v, u = np.mgrid[:HEIGHT, :WIDTH]
+    rays = np.stack([(u - (WIDTH - 1) / 2) / FOCUS, (v - (HEIGHT - 1) / 2) / FOCUS, np.ones_like(u)], -1).reshape(-1, 3)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    far, hit = np.full(len(rays), 520.0), np.zeros(len(rays), bool)
+    nearest = rays * (rays @ MIDDLE)[:, None]
+    going = np.flatnonzero(np.linalg.norm(nearest - MIDDLE, axis=1) < 57)
+    for _ in range(120):
+        left = distance((rays[going] * far[going, None] - MIDDLE) @ turn(degrees))
+        far[going] += left
+        hit[going[left < 1e-4]] = True
+        going = going[(left >= 1e-4) & (far[going] < 700)]
+    far += SIGMA_MM * errors(np.random.default_rng(seed)).ravel()
+    points = np.zeros(hit.sum(), [("xyz", "<f4", 3), ("sigma", "<f4"), ("intensity", "u1"), ("camera", "u1")])
+    points["xyz"], points["sigma"], points["intensity"] = (rays * far[:, None])[hit], SIGMA_MM, 90
+    fields = "".join(f"property {kind}\n" for kind in ("float x", "float y", "float z", "float sigma_mm", "uchar intensity",
+                                                        "uchar camera"))
+    return (f"ply\nformat binary_little_endian 1.0\ncomment units mm\nelement vertex {len(points)}\n{fields}end_header\n"
+            .encode() + points.tobytes())
+
+
+def matrix(name, rows):
+    rows = np.asarray(rows, float)
+    return (f"{name}: !!opencv-matrix\n   rows: {rows.shape[0]}\n   cols: {rows.shape[1]}\n   dt: d\n"
+            f"   data: [ {', '.join(map(str, rows.ravel()))} ]\n")
+
+
+def calibration(focus=FOCUS):
+    camera = [[focus, 0, (WIDTH - 1) / 2], [0, focus, (HEIGHT - 1) / 2], [0, 0, 1]]
+    text = ("%YAML:1.0\n---\nprojector_width: 640\nprojector_height: 480\n"
+            + matrix("projector_matrix", [[900, 0, 320], [0, 900, 240], [0, 0, 1]])
+            + matrix("projector_distortion", [[0] * 5]))
+    camera = (f'name: "camera"\nwidth: {WIDTH}\nheight: {HEIGHT}\n' + matrix("camera_matrix", camera)
+              + matrix("camera_distortion", [[0] * 5]) + matrix("R", np.eye(3)) + matrix("T", [[100], [0], [0]]))
+    return text + "cameras:\n   -\n" + re.sub("(?m)^", "      ", camera).rstrip(" ")
+
+
+def record(folder, clouds, scans=None):
+    (folder / "clouds").mkdir(parents=True)
+    (folder / "calibration.yml").write_text(calibration(), encoding="utf-8")
+    lines = ""
+    for i, bytes_ in enumerate(clouds):
+        name = f"clouds/{i:08d}.ply"
+        (folder / name).write_bytes(bytes_)
+        lines += json.dumps({"cloud": name}) + "\n"
+    (folder / "scans.jsonl").write_text(lines, encoding="utf-8")
+    (folder / "recording.json").write_text(json.dumps({"scans": len(clouds) if scans is None else scans}), encoding="utf-8")
+    return folder
+
+
+def run(*arguments):
+    return subprocess.run((PROGRAM, *map(str, arguments)), capture_output=True, text=True, timeout=600, check=False)
+
+
+def off_truth_mm(points):
+    """The object's frame is the rig's at the first cloud, which sees it unturned."""
+    at = np.stack([points[axis] for axis in "xyz"], -1).astype(float) - MIDDLE
+    slope = np.stack([bumpy_ball(at + 0.01 * axis) - bumpy_ball(at - 0.01 * axis) for axis in np.eye(3)], -1) / 0.02
+    return bumpy_ball(at) / np.linalg.norm(slope, axis=1)
+
+
+class Model(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory(prefix="slsd-test-")
+        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.clouds = [cloud(bumpy_ball, degrees, degrees) for degrees in range(0, 360, STEP_DEGREES)]
+        cls.turning = record(cls.folder / "turning", cls.clouds)
+        done = run("--from", cls.turning, "-o", cls.folder / "a.ply", "--json")
+        assert done.returncode == 0, done.stderr
+        cls.report, cls.messages = json.loads(done.stdout), done.stderr
+        cls.points, cls.triangles = mesh_ply((cls.folder / "a.ply").read_bytes())
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def test_the_mesh_lies_on_the_truth(self):
+        off = off_truth_mm(self.points)
+        self.assertLess(np.sqrt((off ** 2).mean()), 0.07)  # mm; most of it is the places' error
+        self.assertLess(np.quantile(abs(off), 0.95), 0.13)
+        self.assertLess(abs(off).max(), 0.6)
+        self.assertGreater(np.median(self.points["frames"]), 6)
+
+    def test_the_mesh_is_a_manifold_that_faces_outward(self):
+        directed = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        self.assertEqual(np.unique(directed, axis=0, return_counts=True)[1].max(), 1)
+        self.assertEqual(np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)[1].max(), 2)
+        self.assertEqual(len(np.unique(self.triangles)), len(self.points))
+        corners = np.stack([self.points[axis] for axis in "xyz"], -1)[self.triangles].astype(float)
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self.assertGreater(((normals * (corners.mean(axis=1) - MIDDLE)).sum(axis=1) > 0).mean(), 0.999)
+
+    def test_what_was_seen_is_there_and_poles_stay_open(self):
+        """No cloud saw the poles: their normals are across every ray."""
+        at = np.stack([self.points[axis] for axis in "xyz"], -1)[self.triangles] - MIDDLE
+        area = np.linalg.norm(np.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0]), axis=1).sum() / 2
+        self.assertGreater(area, 0.85 * 4 * np.pi * 50 ** 2)
+        directed = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
+        rims = np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)
+        rim = np.stack([self.points[axis] for axis in "xyz"], -1)[rims[0][rims[1] == 1].ravel()] - MIDDLE
+        self.assertGreater(len(rim), 20)
+        self.assertGreater(np.quantile(abs(rim[:, 1]), 0.1), 40)
+
+    def test_the_report_is_true(self):
+        self.assertEqual((self.report["frames"], len(self.report["fused"]), self.report["refused"]), (30, 30, []))
+        self.assertTrue(self.report["closed"])
+        self.assertAlmostEqual(self.report["turned_degrees"], 360 - STEP_DEGREES, delta=1)
+        self.assertLess(self.report["drift_mm"], 0.3)
+        self.assertLess(self.report["seam_mm"], 0.03)
+        self.assertAlmostEqual(self.report["residual_over_sigma"], 1, delta=0.3)
+        self.assertEqual(self.report["triangles"], len(self.triangles))
+        for i, frame in enumerate(self.report["fused"]):
+            rotation = np.array(frame["rotation"]).reshape(3, 3)
+            self.assertLess(abs(rotation - turn(-STEP_DEGREES * i)).max(), 0.002)
+            self.assertLess(abs(rotation @ MIDDLE + frame["translation_mm"] - MIDDLE).max(), 0.15)
+
+    def test_another_program_reads_every_format(self):
+        counts = set()
+        for name in ("a.ply", "b.stl", "b.obj", "b.glb"):
+            if name != "a.ply":
+                self.assertEqual(run("--from", self.turning, "-o", self.folder / name).returncode, 0)
+            done = subprocess.run(("assimp", "info", self.folder / name, "--raw"), capture_output=True, text=True, timeout=300,
+                                  check=False)
+            self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+            counts.add(re.search(r"^Faces: +(\d+)", done.stdout, re.M)[1])
+        self.assertEqual(counts, {str(len(self.triangles))})
+
+    def test_frames_that_do_not_fit_are_named_and_left_out(self):
+        clouds = self.clouds[:5] + [cloud(smooth_ball, 0, 1), self.clouds[20], self.clouds[5][:-9]] + self.clouds[5:8]
+        done = run("--from", record(self.folder / "strange", clouds), "-o", self.folder / "c.ply", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(done.stdout)
+        self.assertEqual([frame["frame"][-6:-4] for frame in report["refused"]], ["05", "06", "07"])
+        self.assertEqual([frame["frame"][-6:-4] for frame in report["fused"]], ["00", "01", "02", "03", "04", "08", "09", "10"])
+        self.assertIn("is cut", report["refused"][2]["reason"])
+        self.assertFalse(report["closed"])
+        self.assertEqual(done.stderr.count("left out"), 3)
+        self.assertLess(np.quantile(abs(off_truth_mm(mesh_ply((self.folder / "c.ply").read_bytes())[0])), 0.95), 0.13)
+
+    def test_what_gives_no_model_says_why(self):
+        ball = record(self.folder / "ball", [cloud(smooth_ball, degrees, degrees) for degrees in (0, 10)])
+        other = record(self.folder / "other", self.clouds[:2])
+        (other / "calibration.yml").write_text(calibration(1.01 * FOCUS), encoding="utf-8")
+        cases = {ball: "too little relief: nothing determines turning about the axis", other: "another calibration",
+                 self.folder: "is not a recording"}
+        for folder, expected in cases.items():
+            with self.subTest(expected=expected):
+                done = run("--from", folder, "-o", self.folder / "none.ply")
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(expected, done.stderr)
+                self.assertFalse((self.folder / "none.ply").exists())
+
+    def test_a_cut_recording_is_used_as_far_as_it_goes(self):
+        cut = record(self.folder / "cut", self.clouds[:4], scans=0)
+        done = run("--from", cut, "-o", self.folder / "d.ply")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("the recording was cut: its first 4 clouds are used", done.stderr)
+
+    def test_wrong_usage(self):
+        cases = {(): "--from", ("--from", "x"): "--output", ("--from", "x", "-o", "a.txt"): ".ply, .stl, .obj or .glb",
+                 ("--from", "x", "-o", "a.ply", "--voxel", "0"): "0.01"}
+        for arguments, expected in cases.items():
+            with self.subTest(arguments=arguments):
+                done = run(*arguments)
+                self.assertEqual(done.returncode, 2)
+                self.assertIn(expected, done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
