@@ -1,76 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include <array>
-#include <charconv>
-#include <cmath>
-#include <optional>
 #include <string>
 
 #include "core/calibration_file/calibration_file.hpp"
+#include "core/calibration_file/yaml_writer.hpp"
 #include "core/geometry/calibration.hpp"
 
 namespace slsd {
 namespace {
-
-constexpr std::size_t kLineLength = 80;
-
-// As OpenCV reads them: only a decimal point distinguishes a real number from an integer.
-std::string number_text(double value) {
-  if (std::isnan(value)) return ".Nan";
-  if (std::isinf(value)) return value < 0 ? "-.Inf" : ".Inf";
-  std::array<char, 32> text{};
-  const auto format =
-      value == std::floor(value) && std::abs(value) < 1e9 ? std::chars_format::fixed : std::chars_format::scientific;
-  const bool whole = format == std::chars_format::fixed;
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value, format, whole ? 0 : 16).ptr;
-  return std::string(text.data(), end) + (whole ? "." : "");
-}
-
-// Writes OpenCV's YAML, line by line.
-class Writer {
- public:
-  void begin_sequence(const char* key) { line(std::string(key) + ":"), indent_ += 3; }
-  void end_sequence() { indent_ -= 3; }
-  void begin_map() { line("-"), indent_ += 3; }
-  void end_map() { indent_ -= 3; }
-
-  void write(const char* key, int value) { line(std::string(key) + ": " + std::to_string(value)); }
-  void write(const char* key, double value) { line(std::string(key) + ": " + number_text(value)); }
-  void write(const char* key, const std::string& value) {
-    std::string quoted;
-    for (const char letter : value) (quoted += letter == '"' || letter == '\\' ? "\\" : "") += letter;
-    line(std::string(key) + ": \"" + quoted + "\"");
-  }
-  void write(const char* key, const Eigen::Ref<const Eigen::MatrixXd>& matrix) {
-    line(std::string(key) + ": !!opencv-matrix");
-    indent_ += 3;
-    line("rows: " + std::to_string(matrix.rows()));
-    line("cols: " + std::to_string(matrix.cols()));
-    line("dt: d");
-    std::string numbers = "data: [";
-    for (Eigen::Index i = 0; i < matrix.size(); ++i) {
-      const std::string number = std::string(" ").append(number_text(matrix(i / matrix.cols(), i % matrix.cols())));
-      if (indent_ + numbers.size() + number.size() >= kLineLength) {
-        line(numbers);
-        numbers = "   ";
-      }
-      numbers += number + (i + 1 < matrix.size() ? "," : " ]");
-    }
-    line(numbers);
-    indent_ -= 3;
-  }
-  template <class T>
-  void write(const char* key, const std::optional<T>& value) {
-    if (value) write(key, *value);
-  }
-  [[nodiscard]] std::string take() { return std::move(text_); }
-
- private:
-  void line(const std::string& words) { text_ += std::string(indent_, ' ') + words + "\n"; }
-
-  std::string text_ = "%YAML:1.0\n---\n";
-  std::size_t indent_ = 0;
-};
 
 Eigen::Matrix3d pinhole(const Lens& lens) {
   Eigen::Matrix3d matrix;
@@ -82,12 +19,12 @@ Eigen::Matrix<double, 1, 5> distortion(const Lens& lens) {
   return Eigen::Map<const Eigen::Matrix<double, 1, 5>>(lens.distortion.data());
 }
 
-void write_sigma(Writer& file, const char* key, const std::vector<double>& sigma) {
+void write_sigma(YamlWriter& file, const char* key, const std::vector<double>& sigma) {
   if (sigma.empty()) return;
   file.write(key, Eigen::Map<const Eigen::RowVectorXd>(sigma.data(), static_cast<Eigen::Index>(sigma.size())));
 }
 
-void write_camera(Writer& file, const Calibration& calibration, std::size_t index) {
+void write_camera(YamlWriter& file, const Calibration& calibration, std::size_t index) {
   const CalibratedCamera& camera = calibration.cameras[index];
   const CalibrationReport& report = calibration.report;
   file.begin_map();
@@ -108,7 +45,7 @@ void write_camera(Writer& file, const Calibration& calibration, std::size_t inde
   file.end_map();
 }
 
-void write_report(Writer& file, const CalibrationReport& report) {
+void write_report(YamlWriter& file, const CalibrationReport& report) {
   file.write("reprojection_error_camera_px", report.reprojection_error_camera_px);
   file.write("reprojection_error_projector_px", report.reprojection_error_projector_px);
   file.write("epipolar_error_px", report.epipolar_error_px);
@@ -132,7 +69,7 @@ void write_report(Writer& file, const CalibrationReport& report) {
 }  // namespace
 
 std::string write_calibration(const Calibration& calibration) {
-  Writer file;
+  YamlWriter file;
   file.write("projector_width", calibration.projector.width_px);
   file.write("projector_height", calibration.projector.height_px);
   file.write("projector_matrix", pinhole(calibration.projector));
