@@ -35,6 +35,7 @@ BELOW = {
     "programs/latency": BASE | {"daemon/configuration"},
     "programs/calibrate": BASE | {"daemon/configuration", "daemon/scan", "daemon/rpc", "clients/cpp",
                                   "clients/connection", "programs/latency"},
+    "programs/hand_eye": BASE | {"clients/usage", "daemon/configuration", "daemon/scan", "programs/calibrate"},
     "programs/verify": BASE | {"daemon/configuration", "daemon/scan", "programs/calibrate"},
     "programs/commands": BASE | PROTOCOL | {"daemon/configuration", "daemon/scan", "daemon/server", "daemon/bundle",
                                             "clients/connection", "programs/latency"},

@@ -9,6 +9,7 @@
 #include "clients/slsctl/client_commands.hpp"
 #include "clients/slsctl/client_options.hpp"
 #include "clients/slsctl/output.hpp"
+#include "clients/usage/hand_eye_usage.hpp"
 #include "clients/usage/usage.hpp"
 #include "core/shown_picture.hpp"
 #include "drivers/files/file.hpp"
@@ -170,6 +171,11 @@ void add_calibrate(CLI::App& app, ClientOptions& options) {
   calibrate->add_flag("--resume", options.resume, "continue with the pictures of the last session");
 }
 
+void add_hand_eye(CLI::App& app, slsd::HandEyeRequest& request) {
+  CLI::App* hand_eye = add_command(app, kSetUp, "hand-eye", slsd::kHandEyePurpose, slsd::kHandEyeExamples);
+  slsd::add_hand_eye_options(*hand_eye, request);
+}
+
 void add_exposure(CLI::App& app, ClientOptions& options) {
   CLI::App* exposure = add_command(app, kSetUp, "exposure", "measure the scene's light, and propose exposure and gain",
                                    "  slsctl exposure\n  slsctl exposure --camera left --gain-max-db 6\n");
@@ -316,6 +322,8 @@ int main(int argc, char** argv) {
   app.fallthrough();
   app.footer("\"slsctl COMMAND --help\" shows the options of a command and examples.");
   add_commands(app, options);
+  slsd::HandEyeRequest hand_eye;  // checked here, carried out by slsd-hand-eye
+  add_hand_eye(app, hand_eye);
   const auto arguments = without_help_command(argc, argv);
   std::string command;
   const auto check = [&] {
@@ -327,5 +335,6 @@ int main(int argc, char** argv) {
   };
   if (const auto ended = slsd::parse_usage(app, static_cast<int>(arguments.size()), arguments.data(), check))
     return *ended;
+  if (command == "hand-eye") return slsd::hand_eye_command(options, argv);
   return slsd::finish(options, run(command, options));
 }

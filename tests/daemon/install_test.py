@@ -87,6 +87,7 @@ class Install(unittest.TestCase):
     def test_puts_everything_in_its_place(self):
         install("/usr", str(self.root))
         for file in ("usr/bin/slsd", "usr/bin/slsctl", "usr/bin/slsd-web", "usr/libexec/slsd/slsd-calibrate", "usr/libexec/slsd/slsd-picture",
+                     "usr/libexec/slsd/slsd-hand-eye",
                      *(f"usr/lib/systemd/system/{unit}" for unit in UNITS), "usr/share/man/man8/slsd-web.8", "usr/bin/slsd-tcp", "usr/share/man/man8/slsd-tcp.8",
                      "usr/lib/sysusers.d/slsd.conf", "usr/lib/systemd/catalog/slsd.catalog", "usr/lib/udev/rules.d/60-slsd.rules",
                      "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",
@@ -182,7 +183,7 @@ class Install(unittest.TestCase):
         for program in sorted((self.root / "usr/bin").iterdir()):
             yield (program.name,)
             if program.name == "slsctl":
-                yield from ((program.name, command) for command in re.findall(r"(?m)^  ([a-z]+)  ", self.help_of(program.name)))
+                yield from ((program.name, command) for command in re.findall(r"(?m)^  ([a-z][a-z-]*)  ", self.help_of(program.name)))
 
     def by_bash(self, line):
         words = line.split(" ")

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """The service and the program that calibrates are two: what the service is linked with, and how the one starts the other."""
+import json
 import os
 import pathlib
 import re
@@ -70,6 +71,32 @@ class Programs(unittest.TestCase):
         done = self.print_board(self.put("slsd", "usr/bin/slsd"))
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr, r"^slsd: \S*libexec/slsd/slsd-calibrate: .*install the package slsd-calibrate\n$")
+
+    def test_where_hand_eye_is_not_installed_its_package_is_named(self):
+        slsctl = self.put("slsctl", "usr/bin/slsctl")
+        done = subprocess.run([slsctl, "hand-eye", "--mounted", "arm", "--poses", "ur", "--from", self.root], capture_output=True,
+                              text=True, check=False, timeout=60)
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, r"^slsctl: \S*libexec/slsd/slsd-hand-eye: .*install the package slsd-calibrate\n$")
+
+    def test_hand_eye_is_carried_out_by_its_program(self):
+        slsctl = self.put("slsctl", "usr/bin/slsctl")
+        self.put("slsd-hand-eye", "usr/libexec/slsd/slsd-hand-eye")
+        for words in ((), ("--json",)):
+            done = subprocess.run([slsctl, *words, "hand-eye", "--mounted", "arm", "--poses", "ur", "--from", self.root,
+                                   "--config", self.root / "none.toml"], capture_output=True, text=True, check=False, timeout=60)
+            self.assertEqual(done.returncode, 1)
+            if words:
+                self.assertIn("none.toml", json.loads(done.stdout)["error"]["message"])
+            else:
+                self.assertRegex(done.stderr, r"^slsctl: \S*none.toml: ")
+        self.assertEqual(list(self.root.glob("*.yml")), [])
+
+    def test_hand_eye_asks_for_what_it_needs(self):
+        for words, reason in (((), "--mounted"), (("--mounted", "desk"), "desk"), (("--mounted", "arm", "--poses", "kukaa"), "kuka")):
+            done = subprocess.run([BIN / "slsctl", "hand-eye", *words], capture_output=True, text=True, check=False, timeout=60)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(reason, done.stderr)
 
     def test_one_that_does_not_start_is_named(self):
         slsd = self.put("slsd", "usr/bin/slsd")

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/report.hpp"
+#include "clients/usage/hand_eye_usage.hpp"
+#include "drivers/system/own_program.hpp"
+
+namespace slsd {
+
+int hand_eye_command(const ClientOptions& options, char** argv) {
+  const auto program = find_own_program(kHandEyeProgram);
+  ::execv(program.c_str(), argv);
+  const bool missing = errno == ENOENT || errno == ENOTDIR;
+  const Error error{missing ? ErrorCode::kNotFound : ErrorCode::kIo,
+                    missing ? "the program that calibrates is not installed: install the package slsd-calibrate"
+                            : "does not start: " + std::generic_category().message(errno),
+                    program.string()};
+  return report(options, {kRequestFailed, rpc_error(error)});
+}
+
+}  // namespace slsd

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "programs/hand_eye/hand_eye_from_files.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "core/board/find_board.hpp"
+#include "core/calibration_file/hand_eye_file.hpp"
+#include "core/hand_eye/diagnose_hand_eye.hpp"
+#include "core/image_size.hpp"
+#include "core/utc_text.hpp"
+#include "daemon/configuration/settings_over.hpp"
+#include "daemon/scan/scan_setup.hpp"
+#include "drivers/files/file.hpp"
+#include "drivers/files/read_image.hpp"
+#include "programs/calibrate/board_request.hpp"
+#include "programs/calibrate/captures/capture_folder.hpp"
+#include "programs/calibrate/captures/captured_pictures.hpp"
+#include "programs/hand_eye/poses_file.hpp"
+
+namespace slsd {
+namespace {
+
+constexpr std::size_t kPosesFileBytes = 1 << 20;
+constexpr double kPrintUnmeasured = 2e-3, kPrintMeasured = 3e-4;  // one standard deviation of the print's scale
+constexpr double kDegreesOfRad = 180 / std::numbers::pi;
+
+double degrees_of(double rad) {
+  return rad * kDegreesOfRad;
+}
+
+Result<Calibration> scanner_calibration(const Configuration& configuration) {
+  auto calibration = configured_calibration(configuration);
+  if (!calibration) return tl::unexpected(calibration.error());
+  if (*calibration) return std::move(**calibration);
+  return fail(ErrorCode::kNotFound,
+              "the scanner has no calibration: calibrate it first, or name its configuration with --config");
+}
+
+/// The requested board; else the calibration's, if its file names one.
+Result<Board> board_of(const HandEyeRequest& request, const Calibration& calibration) {
+  if (request.board.empty() && calibration.report.board) {
+    if (auto board = parse_board(*calibration.report.board)) return board;
+  }
+  CalibrateRequest as_for_calibrating;
+  as_for_calibrating.board = request.board, as_for_calibrating.ruler = request.ruler;
+  return requested_board(as_for_calibrating);
+}
+
+/// Reads the looks of a folder.
+class LookReader {
+ public:
+  LookReader(const Calibration& calibration, const Board& board, std::string first_camera, bool quiet)
+      : calibration_(calibration), board_(board), first_camera_(std::move(first_camera)), quiet_(quiet) {}
+
+  /// @return  nothing if the board is not visible
+  Result<std::optional<LocatedBoard>> read(const CapturedPose& pose) {
+    std::vector<CameraSighting> sightings;
+    std::string reasons;
+    for (const auto& [folder, files] : pose.cameras) {
+      const CalibratedCamera* const camera = calibration_.camera(folder.empty() ? first_camera_ : folder);
+      if (camera == nullptr) return fail(ErrorCode::kNotFound, "the calibration has no camera of this name", folder);
+      if (files.white.empty()) return tl::unexpected(*files.lack);
+      const auto image = read_image(files.white);
+      if (!image) return tl::unexpected(image.error());
+      const ImageSize size = size_of(*image);
+      if (size != ImageSize{camera->lens.width_px, camera->lens.height_px}) {
+        return fail(ErrorCode::kMismatch,
+                    fmt::format("has {} px, but the calibration is for {}: take pictures with the calibrated camera",
+                                size_text(size.width_px, size.height_px),
+                                size_text(camera->lens.width_px, camera->lens.height_px)),
+                    files.white.string());
+      }
+      auto sighting = look_for_board(*image);
+      if (!sighting) {
+        reasons += (reasons.empty() ? "" : "; ") + sighting.error().message;
+        continue;
+      }
+      sightings.push_back({static_cast<std::size_t>(camera - calibration_.cameras.data()), std::move(*sighting)});
+    }
+    const auto located =
+        sightings.empty() ? fail(ErrorCode::kNotFound, reasons) : locate_board(sightings, board_, calibration_);
+    if (!located) {
+      std::cerr << fmt::format("{}: not used: {}\n", pose.name, located.error().message);
+      return std::nullopt;
+    }
+    if (!quiet_) {
+      std::cout << fmt::format("{}: {} corners at {:.0f} mm, {:.3f} px\n", pose.name, located->corners,
+                               (located->rig_from_board * located->middle_mm).norm(),
+                               std::sqrt(located->squares_px2 / located->degrees_of_freedom()))
+                << std::flush;
+    }
+    return *located;
+  }
+
+ private:
+  Result<BoardSighting> look_for_board(const GreyImage& image) {
+    const auto view = std::visit([](const auto& pixels) -> GreyView { return pixels.view(); }, image);
+    auto sighting = find_board(view, board_);
+    const auto other = rows_by_columns(board_);
+    if (sighting || seen_ || !other) {
+      seen_ = seen_ || sighting;
+      return sighting;
+    }
+    auto turned = find_board(view, *other);
+    if (!turned) return sighting;
+    seen_ = true;
+    board_ = *other;
+    return turned;
+  }
+
+  const Calibration& calibration_;
+  Board board_;
+  std::string first_camera_;
+  bool quiet_;
+  bool seen_ = false;  // so the board's orientation is known
+};
+
+/// Lines of poses.csv, without those to leave out.
+Result<std::vector<PoseLine>> lines_of(const HandEyeRequest& request) {
+  const auto file = request.from / "poses.csv";
+  const auto text = read_file(file, kPosesFileBytes);
+  if (!text) return tl::unexpected(text.error());
+  auto lines = read_poses(*text, file.string());
+  if (!lines) return lines;
+  for (const std::string& name : request.without) {
+    if (std::erase_if(*lines, [&](const PoseLine& line) { return line.name == name; }) == 0)
+      return fail(ErrorCode::kInvalidArgument, "names no line of poses.csv", "--without " + name);
+  }
+  return lines;
+}
+
+Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Calibration& calibration, const Board& board,
+                                  const std::string& first_camera) {
+  HandEyeRecord record;
+  record.mounted = request.mounted == "arm" ? Mounted::kArm : Mounted::kCell;
+  const auto notation = pose_notation(request.poses);
+  if (!notation) return tl::unexpected(notation.error());
+  record.notation = *notation;
+  const auto lines = lines_of(request);
+  if (!lines) return tl::unexpected(lines.error());
+  const auto captures = list_captures(request.from, WhitePicture::kNeeded);
+  if (!captures) return tl::unexpected(captures.error());
+  for (const PoseLine& line : *lines) {
+    if (std::ranges::find(*captures, line.name, &CapturedPose::name) != captures->end()) continue;
+    return fail(ErrorCode::kNotFound, "poses.csv names it, but there is no such folder",
+                (request.from / line.name).string());
+  }
+  LookReader reader(calibration, board, first_camera, request.json);
+  std::vector<LocatedBoard> boards;
+  for (const CapturedPose& capture : *captures) {
+    const auto line = std::ranges::find(*lines, capture.name, &PoseLine::name);
+    if (line == lines->end()) continue;
+    auto seen = reader.read(capture);
+    if (!seen) return tl::unexpected(seen.error());
+    if (!*seen) continue;
+    record.looks.push_back({capture.name, line->numbers, **seen});
+    boards.push_back(**seen);
+  }
+  record.shared = SharedErrors::of(calibration, request.ruler.empty() ? kPrintUnmeasured : kPrintMeasured);
+  record.corner_px = corner_noise_px(boards);
+  if (request.measured_mm.size() == 3)
+    record.measured_mm = Eigen::Vector3d(request.measured_mm[0], request.measured_mm[1], request.measured_mm[2]);
+  return record;
+}
+
+double usual_distance_mm(const HandEyeRecord& record) {
+  std::vector<double> distances{1000};
+  if (!record.looks.empty()) distances.clear();
+  for (const RecordedLook& look : record.looks)
+    distances.push_back((look.board.rig_from_board * look.board.middle_mm).norm());
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+std::string result_text(const HandEyeResult& result) {
+  const HandEyeFit& fit = *result.fit;
+  const Eigen::Vector3d& place = fit.places.mount_from_rig.translation;
+  const bool arm = result.session.mounted == Mounted::kArm;
+  return fmt::format(
+      "the robot's poses have a noise of {:.3f} mm and {:.3f}°; the print is {:+.3f} % off its scale\n"
+      "the scanner sits at ({:.2f}, {:.2f}, {:.2f}) mm {}, exact to {:.2f} mm and {:.3f}° (one standard deviation)\n"
+      "{}: 95 % of points at {:.0f} mm are placed to {:.2f} mm\n",
+      fit.noise.place_mm, degrees_of(fit.noise.turn_rad), 100 * fit.shared[SharedErrors::kPrintScale], place.x(),
+      place.y(), place.z(), arm ? "from the flange" : "from the robot's base", result.verdict.place_sigma_mm,
+      degrees_of(result.verdict.turn_sigma_rad), to_string(grade(result.verdict)), result.verdict.distance_mm,
+      result.verdict.error_mm);
+}
+
+HandEyeCalibration to_keep(const HandEyeResult& result, const Board& board, const Calibration& calibration) {
+  const HandEyeFit& fit = *result.fit;
+  HandEyeCalibration kept;
+  kept.mounted = result.session.mounted;
+  kept.mount_from_rig = fit.places.mount_from_rig;
+  kept.covariance = fit.covariance.topLeftCorner<6, 6>();
+  kept.distance_mm = result.verdict.distance_mm, kept.error_mm = result.verdict.error_mm;
+  kept.verdict = to_string(grade(result.verdict));
+  kept.robot_place_mm = fit.noise.place_mm, kept.robot_turn_rad = fit.noise.turn_rad;
+  kept.poses = static_cast<int>(result.session.looks.size());
+  kept.board = to_string(board), kept.date = utc_text(std::chrono::system_clock::now());
+  kept.calibration_date = calibration.report.date.value_or("");
+  return kept;
+}
+
+Result<> refuse(const HandEyeResult& result) {
+  std::string text;
+  for (const HandEyeFinding& finding : result.findings) text += (text.empty() ? "" : "\n  also: ") + finding.text;
+  return fail(ErrorCode::kMismatch, text);
+}
+
+}  // namespace
+
+Result<> hand_eye_from_files(const HandEyeRequest& request) {
+  std::ostream& words = request.json ? std::cerr : std::cout;
+  const auto configuration = load_configuration_in_force(request.configuration_file, words);
+  if (!configuration) return tl::unexpected(configuration.error());
+  const auto calibration = scanner_calibration(*configuration);
+  if (!calibration) return tl::unexpected(calibration.error());
+  const auto board = board_of(request, *calibration);
+  if (!board) return tl::unexpected(board.error());
+  const auto output = request.output.empty() ? request.from / "hand_eye.yml" : request.output;
+  if (auto writable = check_writable(output); !writable) return writable;
+  const std::string first_camera = configuration->cameras.empty() ? "" : configuration->cameras.front().name();
+  const auto record = read_record(request, *calibration, *board, first_camera);
+  if (!record) return tl::unexpected(record.error());
+  const double distance_mm = request.distance_mm.value_or(usual_distance_mm(*record));
+  const auto result = diagnose_hand_eye(*record, distance_mm);
+  if (!result) return tl::unexpected(result.error());
+  if (!result->findings.empty()) return refuse(*result);
+  if (!request.json) std::cout << result_text(*result);
+  auto written = write_file_atomically(output, write_hand_eye(to_keep(*result, *board, *calibration)));
+  if (!written) return written;
+  if (!request.json) {
+    std::cout << "written to " << output.string() << std::endl;
+    return {};
+  }
+  std::cout << nlohmann::json{{"file", output.string()},
+                              {"verdict", to_string(grade(result->verdict))},
+                              {"poses", record->looks.size()},
+                              {"distance_mm", distance_mm},
+                              {"error_mm", result->verdict.error_mm},
+                              {"robot_place_sigma_mm", result->fit->noise.place_mm},
+                              {"robot_turn_sigma_rad", result->fit->noise.turn_rad}}
+                   .dump()
+            << std::endl;
+  return {};
+}
+
+}  // namespace slsd
