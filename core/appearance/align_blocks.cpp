@@ -44,7 +44,8 @@ inline __attribute__((always_inline)) void fetch_ahead(const FrameAndField& of, 
     const int u = std::clamp(e.origin_u[lane] + step_u + step_u / (kLanes - 1), 0, of.field_width - 1);
     const int v = e.origin_v[lane] + step_v + step_v / (kLanes - 1);
     for (int row = -kRows; row <= kRows; ++row)
-      __builtin_prefetch(of.samples + static_cast<std::ptrdiff_t>(std::clamp(v + row, 0, of.field_height - 1)) * of.field_width + u);
+      __builtin_prefetch(of.samples +
+                         static_cast<std::ptrdiff_t>(std::clamp(v + row, 0, of.field_height - 1)) * of.field_width + u);
   }
 }
 
