@@ -246,7 +246,7 @@ void add_preset(CLI::App& app, ClientOptions& options) {
                                  "  slsctl preset save part-a\n"
                                  "  slsctl preset list\n"
                                  "  slsctl preset use part-a\n"
-                                 "  slsctl scan --preset part-a cloud.ply\n");
+                                 "  slsctl preset show part-a\n");
   preset->add_option("ACTION", options.action, "what to do")
       ->required()
       ->check(one_of({"save", "use", "list", "show", "delete"}));
