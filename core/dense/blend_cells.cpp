@@ -201,13 +201,15 @@ void CellBlender::read_nodes(const SurfaceGrid& grid, int row, std::vector<float
   }
 }
 
+void CellBlender::take_both(Number which, const float* (&of)[2]) const {
+  of[0] = upper_.data() + which * pitch_, of[1] = lower_.data() + which * pitch_;
+}
+
 void CellBlender::find_kinds() {
-  const auto both = [&](Number which, const float*(&of)[2]) {
-    of[0] = upper_.data() + which * pitch_, of[1] = lower_.data() + which * pitch_;
-  };
   Judging in{};
-  both(kGood, in.good), both(kValue, in.value), both(kSlopeX, in.slope_x), both(kSlopeY, in.slope_y);
-  both(kNoise, in.noise), both(kSupport, in.support);
+  take_both(kGood, in.good), take_both(kValue, in.value), take_both(kSlopeX, in.slope_x),
+      take_both(kSlopeY, in.slope_y);
+  take_both(kNoise, in.noise), take_both(kSupport, in.support);
   in.per_px = upper_.data() + kPerPx * pitch_;
   const auto stride = static_cast<float>(stride_);
   in.near = 0.5F * (stride - 1), in.far = in.near - stride;
@@ -220,12 +222,10 @@ void CellBlender::find_kinds() {
 }
 
 void CellBlender::set_coefficients(int y) {
-  const auto both = [&](Number which, const float*(&of)[2]) {
-    of[0] = upper_.data() + which * pitch_, of[1] = lower_.data() + which * pitch_;
-  };
   Mixing in{};
-  both(kValue, in.value), both(kSlopeX, in.slope_x), both(kSlopeY, in.slope_y), both(kSigma, in.sigma);
-  both(kLight, in.light);
+  take_both(kValue, in.value), take_both(kSlopeX, in.slope_x), take_both(kSlopeY, in.slope_y),
+      take_both(kSigma, in.sigma);
+  take_both(kLight, in.light);
   in.stride = static_cast<float>(stride_), in.y = static_cast<float>(y), in.share = in.y / in.stride;
   in.pitch = pitch_;
   for (int column = 0; column + 1 < columns_; column += kLanes)

@@ -40,6 +40,7 @@ class CellBlender {
   /// sigma, two of the light.
   static constexpr int kCoefficients = 7;
   void read_nodes(const SurfaceGrid& grid, int row, std::vector<float>& to) const;
+  void take_both(Number which, const float* (&of)[2]) const;  // of the upper and the lower nodes
   void find_kinds();
   void set_coefficients(int y);
   void blend_run(int first, int end, std::size_t pixel, DenseMap& map) const;

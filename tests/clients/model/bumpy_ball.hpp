@@ -57,8 +57,8 @@ inline RigidTransform rig_from_object(double turn_degrees, double tilt_degrees =
   return {rotation, kMiddle + shift};
 }
 
-/// What a scanner measures of the object. The errors along the rays have `sigma_mm` and are alike over some pixels, as
-/// those of dense clouds.
+/// A scan of the object. The errors along the rays have `sigma_mm` and are alike over some pixels, as those of dense
+/// clouds.
 inline std::vector<MeasuredPoint> measure(const Distance& distance, const RigidTransform& rig_from_object,
                                           float sigma_mm, unsigned seed) {
   constexpr int kAlikePx = 6;
@@ -103,7 +103,7 @@ inline Shot shot_of(const Distance& distance, const RigidTransform& rig_from_obj
   return make_shot(*range_images(measure(distance, rig_from_object, sigma_mm, seed), test_calibration(), std::nullopt));
 }
 
-/// How far apart two places of the object are, at most, on its surface.
+/// The largest distance between a place of the object in one pose and in the other, at its surface.
 inline double apart_mm(const RigidTransform& a, const RigidTransform& b) {
   double most = 0;
   for (const Eigen::Vector3d& place :

@@ -37,7 +37,7 @@ Off off(const RigidTransform& found, const RigidTransform& truth) {
           kDegreesOfRad * Eigen::AngleAxisd(truth.rotation * found.rotation.transpose()).angle()};
 }
 
-/// Whether the 95 % ellipse of a point one metre before the scanner holds the truth.
+/// Tells if the 95 % ellipse of a point one metre before the scanner holds the truth.
 bool holds(const HandEyeFit& fit, const RigidTransform& truth) {
   const Eigen::Vector3d point(0, 0, 1000), lever = fit.places.mount_from_rig.rotation * point;
   Eigen::Matrix<double, 3, 6> by_change;
