@@ -202,8 +202,13 @@ Adjustment adjust(std::span<ModelFrame> frames) {
       to->insert(to->end(), sums.over_sigma.begin(), sums.over_sigma.end());
   }
   done.over_sigma = kSigmaOfMedian * static_cast<double>(median_in_place(all));
-  for (std::vector<float>& of_frame : by_frame)
-    done.fit.push_back(kSigmaOfMedian * static_cast<double>(median_in_place(of_frame)));
+  for (std::vector<float>& of_frame : by_frame) {
+    if (of_frame.empty()) {
+      done.fit.emplace_back();
+    } else {
+      done.fit.emplace_back(kSigmaOfMedian * static_cast<double>(median_in_place(of_frame)));
+    }
+  }
   return done;
 }
 

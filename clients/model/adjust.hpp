@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -12,12 +13,12 @@ namespace slsd::model {
 
 /// Result of an adjustment of all places.
 struct Adjustment {
-  std::size_t links = 0;    ///< pairs of frames that see the same surface
-  bool closed = false;      ///< a frame from the end meets one from the beginning
-  double drift_mm = 0;      ///< before: how far apart the first and the last frames put the surface that both see
-  double seam_mm = 0;       ///< the same after it
-  double over_sigma = 0;    ///< usual distance between the surfaces of linked frames over its sigma
-  std::vector<double> fit;  ///< the same for each frame
+  std::size_t links = 0;  ///< pairs of frames that see the same surface
+  bool closed = false;    ///< a frame from the end meets one from the beginning
+  double drift_mm = 0;    ///< before: how far apart the first and the last frames put the surface that both see
+  double seam_mm = 0;     ///< the same after it
+  double over_sigma = 0;  ///< usual distance between the surfaces of linked frames over its sigma
+  std::vector<std::optional<double>> fit;  ///< the same for each frame; nothing if no other sees its surface
 };
 
 /// Moves all frames so that their surfaces meet: one adjustment over all places, of the distances between the surfaces

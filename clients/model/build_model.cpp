@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
@@ -100,18 +101,23 @@ Result<Model> build_model(const RecordedClouds& recorded, const ModelOptions& op
   Volume volume({.voxel_mm = report.voxel_mm, .band_mm = 5 * report.voxel_mm});
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const std::string& name = recorded.names[frames[i].number];
-    const double fit = report.adjustment.fit[i];
-    if (fit > kGreatestFitAdjusted) {
-      report.refused.push_back({name, fmt::format("its surface lies {:.1f} sigma off the others'", fit)});
+    const std::optional<double>& fit = report.adjustment.fit[i];
+    if (!fit || *fit > kGreatestFitAdjusted) {
+      report.refused.push_back({name, fit ? fmt::format("its surface lies {:.1f} sigma off the others'", *fit)
+                                          : "no other cloud shows the same surface"});
       tell(name + ": left out: " + report.refused.back().reason);
       continue;
     }
     const auto shot = read_shot(recorded, name, options);
     if (!shot) return tl::unexpected(shot.error());
     volume.add(*shot, frames[i].object_from_rig);
-    report.fused.push_back({name, frames[i].object_from_rig, fit});
+    report.fused.push_back({name, frames[i].object_from_rig, *fit});
   }
   model.mesh = tidy(volume.mesh(), kSmallestPiece);
+  if (model.mesh.triangles.empty())
+    return fail(
+        ErrorCode::kMalformed,
+        "no place was measured by two clouds: record more, and turn the object by at most 15 degrees between two");
   report.volume_bytes = volume.bytes();
   std::vector<float> sigmas = model.mesh.sigma_mm;
   report.usual_sigma_mm = static_cast<double>(median_in_place(sigmas));

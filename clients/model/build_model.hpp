@@ -55,7 +55,8 @@ using Tell = std::function<void(const std::string&)>;
 
 /// Tracks the object through the clouds, adjusts all places at once and fuses the clouds into a mesh in the frame of
 /// the rig at the first frame. Reads each cloud twice, so that memory holds the surface alone.
-/// @errors kMalformed: no frame can be used; kMismatch: clouds of another calibration; of reading files
+/// @errors kMalformed: no frame can be used, or no two show the same place; kMismatch: clouds of another calibration;
+/// of reading files
 [[nodiscard]] Result<Model> build_model(const RecordedClouds& recorded, const ModelOptions& options, const Tell& tell);
 
 }  // namespace slsd::model

@@ -197,8 +197,9 @@ class Model(unittest.TestCase):
         ball = record(self.folder / "ball", [cloud(smooth_ball, degrees, degrees) for degrees in (0, 10)])
         other = record(self.folder / "other", self.clouds[:2])
         (other / "calibration.yml").write_text(calibration(1.01 * FOCUS), encoding="utf-8")
-        cases = {ball: "too little relief: nothing determines turning about the axis", other: "another calibration",
-                 self.folder: "is not a recording"}
+        lone = record(self.folder / "lone", self.clouds[:1])
+        cases = {lone: "no place was measured by two clouds", other: "another calibration", self.folder: "is not a recording",
+                 ball: "too little relief: nothing determines turning about the axis"}
         for folder, expected in cases.items():
             with self.subTest(expected=expected):
                 done = run("--from", folder, "-o", self.folder / "none.ply")

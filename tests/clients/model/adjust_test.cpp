@@ -60,5 +60,15 @@ TEST(Adjust, KeepsTheFirstFrame) {
   static_cast<void>(adjust({}));
 }
 
+TEST(Adjust, KnowsNoFitOfAFrameThatMeetsNoOther) {
+  std::vector<ModelFrame> frames = drifting(24, 0);
+  frames.resize(3);
+  frames[2].object_from_rig.translation.x() += 400;
+  const Adjustment done = adjust(frames);
+  ASSERT_EQ(done.fit.size(), 3U);
+  EXPECT_TRUE(done.fit[0] && done.fit[1]);
+  EXPECT_FALSE(done.fit[2]);
+}
+
 }  // namespace
 }  // namespace slsd::model
