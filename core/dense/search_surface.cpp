@@ -105,7 +105,8 @@ SurfaceSearch::SurfaceSearch(int letters, int window_px)
 
 std::size_t SurfaceSearch::bytes() const {
   const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
-  return of(open_) + of(places_) + of(scores_) + of(before_) + of(after_) + of(ways_) + of(depths_) + of(seeds_);
+  return of(open_) + of(places_) + of(scores_) + of(before_) + of(after_) + of(ways_) + of(depths_) + of(own_) +
+         of(longest_) + of(all_) + of(seeds_);
 }
 
 /// Chooses the known depths, and some around them.

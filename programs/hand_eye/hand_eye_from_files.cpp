@@ -13,6 +13,7 @@
 
 #include "core/board/find_board.hpp"
 #include "core/calibration_file/hand_eye_file.hpp"
+#include "core/geometry/robust.hpp"
 #include "core/hand_eye/diagnose_hand_eye.hpp"
 #include "core/image_size.hpp"
 #include "core/utc_text.hpp"
@@ -157,7 +158,11 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Calibrati
   std::vector<LocatedBoard> boards;
   for (const CapturedPose& capture : *captures) {
     const auto line = std::ranges::find(*lines, capture.name, &PoseLine::name);
-    if (line == lines->end()) continue;
+    if (line == lines->end()) {
+      if (std::ranges::find(request.without, capture.name) == request.without.end())
+        std::cerr << fmt::format("{}: not used: poses.csv has no line of this name\n", capture.name);
+      continue;
+    }
     auto seen = reader.read(capture);
     if (!seen) return tl::unexpected(seen.error());
     if (!*seen) continue;
@@ -172,13 +177,11 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Calibrati
 }
 
 double usual_distance_mm(const HandEyeRecord& record) {
-  std::vector<double> distances{1000};
-  if (!record.looks.empty()) distances.clear();
+  constexpr double kWithoutLooks = 1000;
+  std::vector<double> distances;
   for (const RecordedLook& look : record.looks)
     distances.push_back((look.board.rig_from_board * look.board.middle_mm).norm());
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return distances.empty() ? kWithoutLooks : median_in_place(distances);
 }
 
 std::string result_text(const HandEyeResult& result) {

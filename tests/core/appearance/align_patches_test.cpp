@@ -176,8 +176,8 @@ Grey8 clipped_at(std::uint8_t full) {
 }
 
 TEST(AlignEight, SaturatedPixelsCountAsInThePlainForm) {
-  for (const std::uint8_t full : {150, 80}) {
-    const Grey8 frame = clipped_at(full);
+  for (const int full : {150, 80}) {
+    const Grey8 frame = clipped_at(static_cast<std::uint8_t>(full));
     PatchTask start = seen().task(750, 520, 0.1F);
     for (int step = 0; step < 4; ++step) {
       std::array<PatchTask, 1> tasks{start};

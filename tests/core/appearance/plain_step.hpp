@@ -58,9 +58,9 @@ PlainStep plain_step(const ImageView<T>& frame, double full, const PatternField&
           level - before.offset - light.value * (before.gain + before.gain_x * off_px.x() + before.gain_y * off_px.y());
       double knows = 1;
       if (level >= full) {
-        const double half = before.gain > 0 ? kCensoredSigmas * sigma : -std::numeric_limits<double>::max();
-        knows = off <= -half ? 0 : off >= half ? 1 : (off + half) / (2 * half);
-        off = off <= -half ? 0 : off >= half ? off : (off + half) / 2;
+        const double reach = before.gain > 0 ? kCensoredSigmas * sigma : -std::numeric_limits<double>::max();
+        knows = off <= -reach ? 0 : off >= reach ? 1 : (off + reach) / (2 * reach);
+        off = off <= -reach ? 0 : off >= reach ? off : (off + reach) / 2;
       }
       const double agrees = before.gain > 0 ? inside * std::pow(1 + std::pow(off / scale, 2), -2) : inside;
       const double weight = knows * agrees;

@@ -11,7 +11,8 @@ inline Mesh tetrahedron() {
   return {.vertices_mm = {{10, 20, 600}, {40, 20, 600}, {10, 50, 600}, {10, 20, 630}},
           .triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}},
           .sigma_mm = {0.125F, 0.25F, 0.5F, 1},
-          .intensity = {0, 51, 102, 255}};
+          .intensity = {0, 51, 102, 255},
+          .frames = {}};
 }
 
 }  // namespace slsd

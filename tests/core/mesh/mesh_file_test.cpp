@@ -32,6 +32,14 @@ TEST(MeshFile, WritesSigmaAndColourToPlyAsFarAsTheyAreThere) {
   EXPECT_THAT(*all, HasSubstr("\nproperty float sigma_mm\nproperty uchar red\n"));
   const std::size_t data = all->find("end_header\n") + 11;
   EXPECT_EQ(all->size(), data + 4 * 19 + 4 * 13);
+  Mesh fused = tetrahedron();
+  fused.frames = {1, 2, 3, 0x104};
+  const auto counted = write_mesh(fused, MeshFormat::kPly, "");
+  ASSERT_TRUE(counted.has_value());
+  EXPECT_THAT(*counted, HasSubstr("\nproperty ushort frames\n"));
+  const std::size_t of_last = counted->find("end_header\n") + 11 + 4 * 21;
+  EXPECT_EQ(counted->size(), of_last + 4 * 13);
+  EXPECT_EQ(counted->substr(of_last - 2, 2), "\x04\x01");  // little-endian
   Mesh bare = tetrahedron();
   bare.sigma_mm.clear(), bare.intensity.clear();
   const auto plain = write_mesh(bare, MeshFormat::kPly, "");

@@ -22,6 +22,7 @@ namespace {
 
 using std::filesystem::path;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr int kLooks = 8;
 
@@ -123,6 +124,20 @@ TEST_F(HandEyeFromFiles, RefusesAPoseWithoutACapture) {
   EXPECT_THAT(to_string(done.error()), HasSubstr("pose_42: poses.csv names it"));
   std::filesystem::remove(home_ / "captures/poses.csv");
   EXPECT_FALSE(hand_eye_from_files(request_));
+}
+
+TEST_F(HandEyeFromFiles, NamesCapturesWithoutAPose) {
+  const auto file = home_ / "captures/poses.csv";
+  std::string text = *read_file(file, 1 << 20);
+  text.erase(text.find("pose_07"));
+  std::ofstream(file) << text;
+  request_.without = {"pose_06"};
+  testing::internal::CaptureStderr();
+  const auto done = hand_eye_from_files(request_);
+  const std::string words = testing::internal::GetCapturedStderr();
+  EXPECT_TRUE(done) << to_string(done.error());
+  EXPECT_THAT(words, HasSubstr("pose_07: not used: poses.csv has no line of this name"));
+  EXPECT_THAT(words, Not(HasSubstr("pose_06")));
 }
 
 TEST(HandEyeFile, RefusesWhatIsNoPlace) {
