@@ -16,6 +16,12 @@ void add_hand_eye_options(CLI::App& command, HandEyeRequest& request) {
   command.add_option("--from", request.from, "a folder with pose_NN/white.png, and poses.csv beside them")
       ->required()
       ->type_name("FOLDER");
+  command
+      .add_option("--pose", request.pose,
+                  "first take a picture with the service, for this pose of the robot, and add both to the folder")
+      ->expected(6, 16)
+      ->delimiter(',')
+      ->type_name("N,N,...");
   command.add_option("-o,--output", request.output, "the file to write (hand_eye.yml in that folder)")
       ->type_name("FILE.yml");
   command

@@ -22,6 +22,8 @@ struct HandEyeRequest {
   std::vector<double> measured_mm;    ///< x y z of the scanner on the flange by a ruler; empty: unknown
   std::optional<double> distance_mm;  ///< working distance for the verdict; empty: that of the boards
   std::vector<std::string> without;   ///< names of poses to leave out
+  std::vector<double> pose;           ///< the robot's numbers: takes a picture with the service first; empty: none
+  std::filesystem::path socket;       ///< the service's; with `pose`
   bool json = false;
 };
 
@@ -32,6 +34,7 @@ inline constexpr const char* kHandEyeProgram = "slsd-hand-eye";
 inline constexpr const char* kHandEyePurpose = "calibrate the scanner's place on a robot's arm or in its cell";
 inline constexpr const char* kHandEyeExamples =
     "  slsctl hand-eye --mounted arm --poses ur --from captures\n"
-    "  slsctl hand-eye --mounted cell --poses kuka --from captures -o hand_eye.yml\n";
+    "  slsctl hand-eye --mounted cell --poses kuka --from captures -o hand_eye.yml\n"
+    "  slsctl hand-eye --mounted arm --poses ur --from captures --pose=0.41,-0.23,0.61,2.9,0.12,0.04\n";
 
 }  // namespace slsd

@@ -330,8 +330,10 @@ std::optional<HandEyeFinding> too_few(const HandEyeRecord& record) {
   for (const RecordedLook& look : record.looks) poses.insert(look.pose);
   if (poses.size() >= kPosesMin) return std::nullopt;
   if (record.looks.size() < kPosesMin) {
-    return HandEyeFinding{Fault::kTooFewPoses,
-                          fmt::format("{} poses are too few: at least 3 are needed, better 12", record.looks.size())};
+    return HandEyeFinding{
+        Fault::kTooFewPoses,
+        fmt::format("{} too few: at least 3 poses are needed, better 12",
+                    record.looks.size() == 1 ? "one pose is" : fmt::format("{} poses are", record.looks.size()))};
   }
   return HandEyeFinding{Fault::kCopied, fmt::format("{} looks have only {} different poses: the rest are copies",
                                                     record.looks.size(), poses.size())};

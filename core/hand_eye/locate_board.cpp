@@ -61,7 +61,7 @@ Linear linearise(const std::vector<Corner>& corners, const Calibration& calibrat
     const Eigen::Vector3d in_rig = rig_from_board * corner.board_mm;
     const Eigen::Matrix3d camera_from_rig = camera.rig_from_camera.rotation.transpose();
     const Eigen::Vector3d in_camera = camera_from_rig * (in_rig - camera.rig_from_camera.translation);
-    if (in_camera.z() <= 0) {
+    if (!(in_camera.z() > 0)) {
       linear.in_front = false;
       return linear;
     }

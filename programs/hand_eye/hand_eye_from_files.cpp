@@ -12,9 +12,11 @@
 #include <nlohmann/json.hpp>
 
 #include "core/board/find_board.hpp"
+#include "core/calibration_file/calibration_file.hpp"
 #include "core/calibration_file/hand_eye_file.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/hand_eye/diagnose_hand_eye.hpp"
+#include "core/hand_eye/next_pose.hpp"
 #include "core/image_size.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/configuration/settings_over.hpp"
@@ -24,12 +26,14 @@
 #include "programs/calibrate/board_request.hpp"
 #include "programs/calibrate/captures/capture_folder.hpp"
 #include "programs/calibrate/captures/captured_pictures.hpp"
+#include "programs/calibrate/session/socket_source.hpp"
 #include "programs/hand_eye/poses_file.hpp"
+#include "programs/hand_eye/take_look.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr std::size_t kPosesFileBytes = 1 << 20;
+constexpr std::size_t kCalibrationBytes = 1 << 20;
 constexpr double kPrintUnmeasured = 2e-3, kPrintMeasured = 3e-4;  // one standard deviation of the print's scale
 constexpr double kDegreesOfRad = 180 / std::numbers::pi;
 
@@ -61,8 +65,9 @@ class LookReader {
   LookReader(const Calibration& calibration, const Board& board, std::string first_camera, bool quiet)
       : calibration_(calibration), board_(board), first_camera_(std::move(first_camera)), quiet_(quiet) {}
 
+  /// @param needed  an invisible board is an error
   /// @return  nothing if the board is not visible
-  Result<std::optional<LocatedBoard>> read(const CapturedPose& pose) {
+  Result<std::optional<LocatedBoard>> read(const CapturedPose& pose, bool needed) {
     std::vector<CameraSighting> sightings;
     std::string reasons;
     for (const auto& [folder, files] : pose.cameras) {
@@ -89,6 +94,7 @@ class LookReader {
     const auto located =
         sightings.empty() ? fail(ErrorCode::kNotFound, reasons) : locate_board(sightings, board_, calibration_);
     if (!located) {
+      if (needed) return fail(ErrorCode::kNotFound, located.error().message, pose.name);
       std::cerr << fmt::format("{}: not used: {}\n", pose.name, located.error().message);
       return std::nullopt;
     }
@@ -127,7 +133,7 @@ class LookReader {
 /// Lines of poses.csv, without those to leave out.
 Result<std::vector<PoseLine>> lines_of(const HandEyeRequest& request) {
   const auto file = request.from / "poses.csv";
-  const auto text = read_file(file, kPosesFileBytes);
+  const auto text = read_file(file, kPosesFileMaxBytes);
   if (!text) return tl::unexpected(text.error());
   auto lines = read_poses(*text, file.string());
   if (!lines) return lines;
@@ -138,8 +144,15 @@ Result<std::vector<PoseLine>> lines_of(const HandEyeRequest& request) {
   return lines;
 }
 
-Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Calibration& calibration, const Board& board,
-                                  const std::string& first_camera) {
+/// A calibrated scanner and the board that it looks at.
+struct Scanner {
+  Calibration calibration;
+  Board board;
+  std::string first_camera;
+};
+
+/// @param added  the look that must show the board; empty: none
+Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Scanner& scanner, const std::string& added) {
   HandEyeRecord record;
   record.mounted = request.mounted == "arm" ? Mounted::kArm : Mounted::kCell;
   const auto notation = pose_notation(request.poses);
@@ -154,7 +167,7 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Calibrati
     return fail(ErrorCode::kNotFound, "poses.csv names it, but there is no such folder",
                 (request.from / line.name).string());
   }
-  LookReader reader(calibration, board, first_camera, request.json);
+  LookReader reader(scanner.calibration, scanner.board, scanner.first_camera, request.json);
   std::vector<LocatedBoard> boards;
   for (const CapturedPose& capture : *captures) {
     const auto line = std::ranges::find(*lines, capture.name, &PoseLine::name);
@@ -163,13 +176,13 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Calibrati
         std::cerr << fmt::format("{}: not used: poses.csv has no line of this name\n", capture.name);
       continue;
     }
-    auto seen = reader.read(capture);
+    auto seen = reader.read(capture, capture.name == added);
     if (!seen) return tl::unexpected(seen.error());
     if (!*seen) continue;
     record.looks.push_back({capture.name, line->numbers, **seen});
     boards.push_back(**seen);
   }
-  record.shared = SharedErrors::of(calibration, request.ruler.empty() ? kPrintUnmeasured : kPrintMeasured);
+  record.shared = SharedErrors::of(scanner.calibration, request.ruler.empty() ? kPrintUnmeasured : kPrintMeasured);
   record.corner_px = corner_noise_px(boards);
   if (request.measured_mm.size() == 3)
     record.measured_mm = Eigen::Vector3d(request.measured_mm[0], request.measured_mm[1], request.measured_mm[2]);
@@ -213,48 +226,124 @@ HandEyeCalibration to_keep(const HandEyeResult& result, const Board& board, cons
   return kept;
 }
 
-Result<> refuse(const HandEyeResult& result) {
+/// Whether further poses cure it.
+bool lacks_poses(const HandEyeFinding& finding) {
+  using Fault = HandEyeFinding::Fault;
+  return finding.fault == Fault::kTooFewPoses || finding.fault == Fault::kOneAxis ||
+         finding.fault == Fault::kLittleMotion;
+}
+
+/// A proposal of the next pose.
+struct Proposal {
+  std::string text;
+  std::vector<double> numbers;  ///< as the robot writes them; empty: too few looks to place the scanner
+};
+
+constexpr double kNumbersPerUnit = 1e4;  // so that neither mm nor m loses what a robot can do
+
+Proposal propose(const HandEyeResult& result, const HandEyeRecord& record, const Scanner& scanner) {
+  if (!result.fit)
+    return {"next pose: tilt the flange by 20° to 35° to another side, with the whole board in the picture", {}};
+  const auto next =
+      propose_pose(result.session, *result.fit, scanner.calibration, scanner.board, result.verdict.distance_mm);
+  if (!next) return {};
+  Proposal proposal{{}, robot_numbers(next->base_from_flange, record.notation)};
+  for (double& number : proposal.numbers) number = std::round(number * kNumbersPerUnit) / kNumbersPerUnit;
+  proposal.text = fmt::format("next pose: {}, to {:.10g}; then points are placed to about {:.2f} mm",
+                              describe(*next, result.session), fmt::join(proposal.numbers, ", "), next->error_mm);
+  return proposal;
+}
+
+Result<> refuse(const HandEyeResult& result, const Proposal& next) {
   std::string text;
   for (const HandEyeFinding& finding : result.findings) text += (text.empty() ? "" : "\n  also: ") + finding.text;
+  if (!next.text.empty()) text += "\n  " + next.text;
   return fail(ErrorCode::kMismatch, text);
+}
+
+/// @param file  empty: not written, as poses are missing
+void tell(const HandEyeRequest& request, const HandEyeResult& result, std::size_t poses, const Proposal& next,
+          const std::string& file) {
+  if (!request.json) {
+    if (!file.empty()) std::cout << result_text(result);
+    for (const HandEyeFinding& finding : result.findings) std::cout << finding.text << "\n";
+    if (!next.text.empty()) std::cout << next.text << "\n";
+    if (!file.empty()) std::cout << "written to " << file << "\n";
+    std::cout << std::flush;
+    return;
+  }
+  nlohmann::json told{{"poses", poses}};
+  if (!next.text.empty()) told["next"] = next.text;
+  if (!next.numbers.empty()) told["next_pose"] = next.numbers;
+  if (!result.findings.empty()) told["missing"] = result.findings.front().text;
+  if (!file.empty()) {
+    told["file"] = file, told["verdict"] = to_string(grade(result.verdict));
+    told["distance_mm"] = result.verdict.distance_mm, told["error_mm"] = result.verdict.error_mm;
+    told["robot_place_sigma_mm"] = result.fit->noise.place_mm;
+    told["robot_turn_sigma_rad"] = result.fit->noise.turn_rad;
+  }
+  std::cout << told.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
+}
+
+/// @param added  a look that was just taken, so more may follow: too few poses or too little motion are no faults;
+///               empty: none
+Result<> evaluate(const HandEyeRequest& request, const Scanner& scanner, const std::string& added) {
+  const auto output = request.output.empty() ? request.from / "hand_eye.yml" : request.output;
+  if (auto writable = check_writable(output); !writable) return writable;
+  const auto record = read_record(request, scanner, added);
+  if (!record) return tl::unexpected(record.error());
+  const auto result = diagnose_hand_eye(*record, request.distance_mm.value_or(usual_distance_mm(*record)));
+  if (!result) return tl::unexpected(result.error());
+  const bool more = std::ranges::all_of(result->findings, &lacks_poses);
+  const bool good = result->findings.empty() && grade(result->verdict) == HandEyeGrade::kGood;
+  const Proposal next = more && !good ? propose(*result, *record, scanner) : Proposal();
+  if (!result->findings.empty()) {
+    if (added.empty() || !more) return refuse(*result, next);
+    tell(request, *result, record->looks.size(), next, {});
+    return {};
+  }
+  auto written = write_file_atomically(output, write_hand_eye(to_keep(*result, scanner.board, scanner.calibration)));
+  if (written) tell(request, *result, record->looks.size(), next, output.string());
+  return written;
+}
+
+Result<Calibration> calibration_in_force(const std::filesystem::path& file) {
+  if (file.empty()) return fail(ErrorCode::kNotFound, "the scanner is not calibrated: run slsctl calibrate first");
+  const auto text = read_file(file, kCalibrationBytes);
+  if (!text) return tl::unexpected(text.error());
+  return read_calibration(*text, file.string());
 }
 
 }  // namespace
 
 Result<> hand_eye_from_files(const HandEyeRequest& request) {
-  std::ostream& words = request.json ? std::cerr : std::cout;
-  const auto configuration = load_configuration_in_force(request.configuration_file, words);
+  const auto configuration =
+      load_configuration_in_force(request.configuration_file, request.json ? std::cerr : std::cout);
   if (!configuration) return tl::unexpected(configuration.error());
-  const auto calibration = scanner_calibration(*configuration);
+  auto calibration = scanner_calibration(*configuration);
   if (!calibration) return tl::unexpected(calibration.error());
   const auto board = board_of(request, *calibration);
   if (!board) return tl::unexpected(board.error());
-  const auto output = request.output.empty() ? request.from / "hand_eye.yml" : request.output;
-  if (auto writable = check_writable(output); !writable) return writable;
   const std::string first_camera = configuration->cameras.empty() ? "" : configuration->cameras.front().name();
-  const auto record = read_record(request, *calibration, *board, first_camera);
-  if (!record) return tl::unexpected(record.error());
-  const double distance_mm = request.distance_mm.value_or(usual_distance_mm(*record));
-  const auto result = diagnose_hand_eye(*record, distance_mm);
-  if (!result) return tl::unexpected(result.error());
-  if (!result->findings.empty()) return refuse(*result);
-  if (!request.json) std::cout << result_text(*result);
-  auto written = write_file_atomically(output, write_hand_eye(to_keep(*result, *board, *calibration)));
-  if (!written) return written;
-  if (!request.json) {
-    std::cout << "written to " << output.string() << std::endl;
-    return {};
-  }
-  std::cout << nlohmann::json{{"file", output.string()},
-                              {"verdict", to_string(grade(result->verdict))},
-                              {"poses", record->looks.size()},
-                              {"distance_mm", distance_mm},
-                              {"error_mm", result->verdict.error_mm},
-                              {"robot_place_sigma_mm", result->fit->noise.place_mm},
-                              {"robot_turn_sigma_rad", result->fit->noise.turn_rad}}
-                   .dump()
-            << std::endl;
-  return {};
+  return evaluate(request, {std::move(*calibration), *board, first_camera}, {});
+}
+
+Result<> hand_eye_by_socket(const HandEyeRequest& request) {
+  const auto notation = pose_notation(request.poses);
+  if (!notation) return tl::unexpected(notation.error());
+  const auto source = SocketSource::create(request.socket);
+  if (!source) return tl::unexpected(source.error());
+  auto calibration = calibration_in_force((*source)->calibration());
+  if (!calibration) return tl::unexpected(calibration.error());
+  const auto board = board_of(request, *calibration);
+  if (!board) return tl::unexpected(board.error());
+  const auto look = take_look(**source, request.from, request.pose, *notation);
+  if (!look) return tl::unexpected(look.error());
+  auto done = evaluate(request, {std::move(*calibration), *board, (*source)->cameras().front()}, look->name);
+  if (done) return done;
+  done.error().message += fmt::format("\n  {} is not kept", look->name);
+  if (auto dropped = drop_look(request.from, *look); !dropped) return dropped;
+  return done;
 }
 
 }  // namespace slsd

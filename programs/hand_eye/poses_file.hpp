@@ -10,6 +10,8 @@
 
 namespace slsd {
 
+inline constexpr std::size_t kPosesFileMaxBytes = 1 << 20;
+
 /// One line of poses.csv.
 struct PoseLine {
   std::string name;             ///< of the capture's folder

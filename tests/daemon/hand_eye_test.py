@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""slsctl hand-eye --pose, look by look, with a service whose camera sees drawn boards. The robot is in numpy."""
+import atexit
+import json
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import unittest
+
+import numpy
+
+from service import BIN, SCENE, Service, slsctl
+
+LOOKS = 10
+CONFIGURATION = """
+[projector]
+width_px = 640
+height_px = 400
+[[camera]]
+name = "camera"
+driver = "file"
+path = "frames"
+loop = false
+[calibration]
+file = "{folder}/calibration.yml"
+[scan]
+projector_latency_ms = 0.0
+[server]
+socket = "slsd.sock"
+"""
+
+
+def turn(axis, angle):
+    x, y, z = numpy.array(axis) / numpy.linalg.norm(axis)
+    cross = numpy.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return numpy.eye(3) + numpy.sin(angle) * cross + (1 - numpy.cos(angle)) * cross @ cross
+
+
+def motion(rotation, place):
+    matrix = numpy.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, place
+    return matrix
+
+
+def angle_of(rotation):
+    return numpy.arccos(numpy.clip((numpy.trace(rotation) - 1) / 2, -1, 1))
+
+
+def kuka(matrix, unit=1.0):
+    r = matrix[:3, :3]
+    angles = (numpy.arctan2(r[1, 0], r[0, 0]), numpy.arctan2(-r[2, 0], numpy.hypot(r[0, 0], r[1, 0])), numpy.arctan2(r[2, 1], r[2, 2]))
+    return [*(unit * matrix[:3, 3]), *numpy.degrees(angles)]
+
+
+def from_kuka(numbers):
+    a, b, c = numpy.radians(numbers[3:])
+    return motion(turn((0, 0, 1), a) @ turn((0, 1, 0), b) @ turn((1, 0, 0), c), numbers[:3])
+
+
+FLANGE_FROM_RIG = motion(turn((0.2, -0.1, 1), 0.7), (60, -35, 110))
+BASE_FROM_BOARD = motion(turn((1, 0.3, -0.2), 2.1), (900, 200, 50))
+
+
+def matrix_of(file, name):
+    """A matrix of a file in OpenCV's YAML."""
+    text = file.read_text(encoding="utf-8")
+    numbers = text.split(f"{name}:", 1)[1].split("data: [", 1)[1].split("]", 1)[0]
+    return numpy.array([float(word) for word in numbers.split(",")])
+
+
+class HandEye(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
+        atexit.register(shutil.rmtree, cls.folder, ignore_errors=True)
+        subprocess.run([BIN / "make_looks", cls.folder, str(LOOKS)], check=True, timeout=300)
+        camera_from_board = numpy.loadtxt(cls.folder / "looks.csv", delimiter=",").reshape(-1, 4, 4)
+        cls.poses = [BASE_FROM_BOARD @ numpy.linalg.inv(each) @ numpy.linalg.inv(FLANGE_FROM_RIG) for each in camera_from_board]
+
+    def service_seeing(self, *looks):
+        """A service whose camera sees these looks, one after the other; None: no board."""
+        service = Service(configuration=CONFIGURATION.format(folder=self.folder))
+        frames = service.folder / "frames"
+        frames.mkdir()
+        for i, look in enumerate(looks):
+            if look is None:
+                (frames / f"{i:02}.pgm").write_bytes(b"P5 800 600 255\n" + bytes(800 * 600))
+            else:
+                shutil.copy(self.folder / f"pose_{look:02}/white.png", frames / f"{i:02}.png")
+        self.captures = service.folder / "captures"
+        return service
+
+    def hand_eye(self, service, numbers, *words, options=()):
+        pose = ",".join(f"{number:.6f}" for number in numbers)
+        return slsctl(*options, "--socket", service.socket, "hand-eye", "--mounted", "arm", "--poses", "kuka", "--from", self.captures,
+                      f"--pose={pose}", *words)
+
+    def files(self):
+        return {each.relative_to(self.captures): each.read_bytes() for each in self.captures.rglob("*") if each.is_file()}
+
+    def refused(self, done, reason):
+        self.assertEqual((done.returncode, done.stdout.count("written")), (1, 0), done.stdout)
+        self.assertRegex(done.stderr, r"\Aslsctl: ")
+        self.assertRegex(done.stderr, reason)
+        self.assertEqual(self.files(), self.before)
+
+    def test_from_the_first_look_to_the_file(self):
+        with self.service_seeing(*range(LOOKS)) as service:
+            self.assertIn("2 poses are too few", [self.hand_eye(service, kuka(pose)) for pose in self.poses[:2]][1].stdout)
+            self.assertFalse((self.captures / "hand_eye.yml").exists())
+            errors = []
+            for i in range(2, LOOKS):
+                done = self.hand_eye(service, kuka(self.poses[i]), options=["--json"])
+                self.assertEqual(done.returncode, 0, done.stderr)
+                told = json.loads(done.stdout)
+                self.assertEqual(told["poses"], i + 1)
+                if "next_pose" in told:
+                    self.check_next(from_kuka(told["next_pose"]))
+                if "file" in told:
+                    errors.append(told["error_mm"])
+            self.assertLess(errors[-1], errors[0])
+        file = self.captures / "hand_eye.yml"
+        place = matrix_of(file, "flange_from_rig_T") - FLANGE_FROM_RIG[:3, 3]
+        rotation = matrix_of(file, "flange_from_rig_R").reshape(3, 3).T @ FLANGE_FROM_RIG[:3, :3]
+        self.assertLess(numpy.linalg.norm(place), 1.5)
+        self.assertLess(angle_of(rotation), 1e-3)
+        self.assertEqual((self.captures / "poses.csv").read_text(encoding="utf-8").count("\n"), LOOKS)
+
+    def check_next(self, base_from_flange):
+        """Of the proposed pose, the board is in the middle of the picture, near the working distance."""
+        rig_from_board = numpy.linalg.inv(base_from_flange @ FLANGE_FROM_RIG) @ BASE_FROM_BOARD
+        middle = (rig_from_board @ (210, 150, 0, 1))[:3]
+        self.assertLess(numpy.hypot(middle[0], middle[1]), 0.03 * middle[2])
+        self.assertTrue(1200 < middle[2] < 2600, middle)
+
+    def test_bad_input_has_one_message_and_changes_nothing(self):
+        late = self.poses[3] @ motion(turn((1, 2, 0), 0.06), (25, -12, 8))  # the robot had not arrived
+        with self.service_seeing(0, 1, 2, 3, 4, 4, None, 4) as service:
+            for pose in self.poses[:4]:
+                self.assertEqual(self.hand_eye(service, kuka(pose)).returncode, 0)
+            self.before = self.files()
+            good = kuka(self.poses[4])
+            self.refused(self.hand_eye(service, [*good[:5], float("nan")]), "has a number that is not finite")
+            self.refused(self.hand_eye(service, [*good, 0.0]), "has 7 numbers instead of 6: x y z in mm, A B C in degrees")
+            self.refused(self.hand_eye(service, kuka(self.poses[4], 0.001)), r"pose_04 contradicts the others.*\n.*pose_04 is not kept\n\Z")
+            self.refused(self.hand_eye(service, kuka(late)), r"pose_04 contradicts the others.*\n.*pose_04 is not kept\n\Z")
+            self.refused(self.hand_eye(service, good), r"pose_04: .*board.*\n.*pose_04 is not kept\n\Z")
+            done = self.hand_eye(service, good)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn(pathlib.Path("pose_04/white.png"), self.files())
+
+    def test_poses_of_another_arm_are_named(self):
+        random = numpy.random.default_rng(4)
+        others = [motion(turn(random.normal(size=3), random.uniform(0.3, 2)), random.uniform(-800, 800, 3)) for _ in range(5)]
+        with self.service_seeing(*range(5)) as service:
+            done = [self.hand_eye(service, kuka(pose)) for pose in others]
+        failed = [each for each in done if each.returncode]
+        self.assertTrue(failed)
+        for each in failed:
+            self.assertEqual(each.returncode, 1)
+            self.assertRegex(each.stderr, r"do not belong to these pictures.*another arm[\s\S]*is not kept\n\Z")
+        self.assertFalse((self.captures / "hand_eye.yml").exists())
+
+    def test_needs_a_service(self):
+        self.captures = self.folder / "nowhere"
+        service = Service(configuration=CONFIGURATION.format(folder=SCENE))
+        done = self.hand_eye(service, kuka(self.poses[0]))
+        self.assertEqual((done.returncode, done.stdout), (3, ""))
+        self.assertFalse(self.captures.exists())
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#include "programs/hand_eye/take_look.hpp"
+
+#include <cstdlib>
+#include <limits>
+
+#include <gmock/gmock.h>
+
+#include "drivers/files/file.hpp"
+
+namespace slsd {
+namespace {
+
+using testing::HasSubstr;
+
+class StillSource final : public PoseSource {
+ public:
+  [[nodiscard]] const std::vector<std::string>& cameras() const override { return names_; }
+  [[nodiscard]] ImageSize projector() const override { return {64, 40}; }
+  void show(const Grey8& image) override { white_ = image.at(0, 0) == 255; }
+  [[nodiscard]] Result<std::vector<GreyImage>> grab() override {
+    if (fails || !white_) return fail(ErrorCode::kTimeout, "no frame");
+    return std::vector<GreyImage>{Grey8(32, 24, 200)};
+  }
+  bool fails = false;
+
+ private:
+  std::vector<std::string> names_{"camera"};
+  bool white_ = false;
+};
+
+class TakeLook : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = testing::TempDir() + "slsd-look-XXXXXX";
+    if (mkdtemp(name.data()) == nullptr) std::abort();
+    folder_ = std::filesystem::path(name) / "captures";
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_.parent_path()); }
+  Result<TakenLook> take(const std::vector<double>& pose) {
+    return take_look(source_, folder_, pose, *pose_notation("kuka"));
+  }
+  [[nodiscard]] std::string lines() const { return read_file(folder_ / "poses.csv", 1 << 20).value_or("none"); }
+
+  std::filesystem::path folder_;
+  StillSource source_;
+};
+
+TEST_F(TakeLook, AddsPictureAndPose) {
+  ASSERT_TRUE(take({1, 2, 3, 40, 50, 60.25}));
+  const auto second = take({-1, 2, 3, 40, 50, 60});
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->name, "pose_01");
+  EXPECT_EQ(lines(), "pose_00,1,2,3,40,50,60.25\npose_01,-1,2,3,40,50,60\n");
+  EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "pose_01/white.png"));
+}
+
+TEST_F(TakeLook, IsDroppedWithoutATrace) {
+  const auto first = take({1, 2, 3, 40, 50, 60});
+  ASSERT_TRUE(first);
+  const std::string before = lines();
+  const auto second = take({-1, 2, 3, 40, 50, 60});
+  ASSERT_TRUE(second);
+  ASSERT_TRUE(drop_look(folder_, *second));
+  EXPECT_EQ(lines(), before);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "pose_01"));
+  ASSERT_TRUE(drop_look(folder_, *first));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(TakeLook, ChangesNothingOnBadInput) {
+  const auto wrong = take({1, 2, 3, 4, 5, std::numeric_limits<double>::quiet_NaN()});
+  ASSERT_FALSE(wrong);
+  EXPECT_THAT(to_string(wrong.error()), HasSubstr("--pose: has a number that is not finite"));
+  EXPECT_FALSE(take({1, 2, 3}));
+  source_.fails = true;
+  EXPECT_FALSE(take({1, 2, 3, 4, 5, 6}));
+  EXPECT_FALSE(std::filesystem::exists(folder_));
+}
+
+TEST_F(TakeLook, KeepsAFileThatIsNoFileOfPoses) {
+  std::filesystem::create_directories(folder_);
+  ASSERT_TRUE(write_file_atomically(folder_ / "poses.csv", "pose_00,1,2,x\n"));
+  const auto refused = take({1, 2, 3, 4, 5, 6});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(to_string(refused.error()), HasSubstr("poses.csv:1: x is not a number"));
+  EXPECT_EQ(lines(), "pose_00,1,2,x\n");
+}
+
+}  // namespace
+}  // namespace slsd
