@@ -99,7 +99,8 @@ class TwoExposures : public ::testing::Test {
       setup_->lanes[0].push_back(std::move(*Decoder::create(*pattern_, calibration, i, {})));
     }
     rig_ = std::make_unique<Rig>(std::make_unique<HeadlessProjector>(HeadlessProjectorOptions{}), std::move(cameras),
-                                 setup_->image, ScanOptions{.timeout_ms = 5000}, exposures_us);
+                                 setup_->image, ScanOptions{.timeout_ms = 60'000, .exposure_skew_ms = 10'000},
+                                 exposures_us);
   }
 
   Result<FrameSet> capture(LightFrames light = {}) {
