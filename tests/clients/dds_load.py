@@ -38,11 +38,35 @@ def take_domain():
     raise RuntimeError("a hundred tests have taken all domains")
 
 
+class Arrivals:
+    """The stamps that a reader prints, by topic."""
+
+    def __init__(self, stream):
+        self.at_us, self.changed = {}, threading.Condition()
+        threading.Thread(target=self.read, args=(stream,), daemon=True).start()
+
+    def read(self, stream):
+        with stream:
+            for line in stream:
+                topic, stamp, at_ns, _ = line.split()
+                whole, fraction = stamp.split(".")
+                with self.changed:
+                    of_topic = self.at_us.setdefault(topic.split("/")[0], {})
+                    of_topic[int(whole) * 1_000_000 + round(int(fraction) / 1000)] = int(at_ns) / 1000
+                    self.changed.notify_all()
+
+    def wait(self, condition, seconds=60):
+        """@return whether the condition holds, at the latest after these seconds"""
+        with self.changed:
+            return self.changed.wait_for(lambda: condition(self.at_us), seconds)
+
+
 class Replay:
     """What slsd is to its subscribers, without the work of scanning: the same cloud again and again."""
 
     def __init__(self, folder, name, points, rate_hz):
         self.path, self.rate_hz, self.sent, self.stop = folder / f"{name}.sock", rate_hz, [], threading.Event()
+        self.confirmed = None  # called with the stamp of each cloud: whether to send another
         head = ["ply", "format binary_little_endian 1.0", f"element vertex {points}", *(f"property {f}" for f in FIELDS)]
         self.cloud = "\n".join([*head, "end_header\n"]).encode() + bytes(18 * points)
         self.listener = socket.socket(socket.AF_UNIX)
@@ -80,61 +104,77 @@ class Replay:
                 os.close(memory)
             else:
                 peer.sendall(message + self.cloud)
+            confirmed = self.confirmed
+            if confirmed is not None and not confirmed(now):
+                return
             due = max(due + 1 / self.rate_hz, time.monotonic())  # late ones do not follow in a burst
             time.sleep(max(0, due - time.monotonic()))
 
 
-def measure(scanners=1, points=2600, rate_hz=10.0, seconds=10.0, stalled=False, best_effort=False, rate_max_mb=16.0):
-    """@return sent, received, lost (of those after the first that arrived), delays_ms sorted, cpu_s"""
+def measure(scanners=1, points=2600, rate_hz=10.0, seconds=10.0, stalled=False, best_effort=False, rate_max_mb=16.0, clouds=None):
+    """@param clouds  of each scanner instead of those in these seconds, each sent when the one before has arrived: however
+    slow the machine is, none may be lost
+    @return sent, received, lost (of those after the first that arrived), delays_ms sorted, cpu_s"""
     domain, held = take_domain()
     network = ["--domain", str(domain), "--interface", "lo", "--peer", "127.0.0.1", "--rate-max", str(rate_max_mb)]
     names = [f"s{i}" for i in range(scanners)]
     topics = [word for name in names for word in ("--topic", f"{name}/points")]
     read = [BIN / "dds_probe", "--domain", str(domain), *topics, "--stamps", "--count", "1000000000", "--seconds", "600"]
     processes = []
-    with held, contextlib.ExitStack() as files:
-        folder = files.enter_context(tempfile.TemporaryDirectory())
+
+    def start(command, **streams):
+        processes.append(subprocess.Popen(command, text=True, **streams))
+        return processes[-1]
+
+    with held, tempfile.TemporaryDirectory() as folder:
         services = {name: Replay(pathlib.Path(folder), name, points, rate_hz) for name in names}
         try:
-            other = subprocess.Popen(read, stdout=subprocess.DEVNULL) if stalled else None
-            processes += [other] if other else []
-            out = files.enter_context(tempfile.TemporaryFile("w+"))
-            reader = subprocess.Popen(read + (["--best-effort"] if best_effort else []), stdout=out)
-            processes.append(reader)
+            other = start(read, stdout=subprocess.PIPE) if stalled else None
+            arrivals = Arrivals(start(read + (["--best-effort"] if best_effort else []), stdout=subprocess.PIPE).stdout)
             for name in names:
-                processes.append(subprocess.Popen(
-                    [BIN / "slsd-dds", "--name", name, "--socket", services[name].path, *network], stderr=subprocess.DEVNULL))
-            give_up = time.monotonic() + 60
-            while not all(len(service.sent) > 5 for service in services.values()) and time.monotonic() < give_up:
-                time.sleep(0.1)
-            time.sleep(2)  # until all found each other: nobody counts these
+                start([BIN / "slsd-dds", "--name", name, "--socket", services[name].path, *network], stderr=subprocess.DEVNULL)
+            for each in [arrivals, *([Arrivals(other.stdout)] if other else [])]:  # nobody counts what comes before
+                if not each.wait(lambda at: len(at) == scanners):
+                    raise RuntimeError("a reader has no cloud of one of the scanners")
             if other:
                 other.send_signal(signal.SIGSTOP)
             begin = time.time_ns() // 1000
-            time.sleep(seconds)
+            if clouds is None:
+                time.sleep(seconds)
+            else:
+                ends = {name: threading.Event() for name in names}
+                for name, service in services.items():
+                    service.confirmed = once_arrived(arrivals, name, begin, clouds, ends[name])
+                for each in ends.values():
+                    each.wait()
             end = time.time_ns() // 1000
             for service in services.values():
                 service.stop.set()
-            time.sleep(2)
+            due = {name: [stamp for stamp in service.sent if begin <= stamp < end] for name, service in services.items()}
+            arrivals.wait(lambda at: all(at[name].keys() >= set(due[name]) for name in names), 2)
         finally:
             for process in processes:
                 process.kill()
                 process.wait()
-        out.seek(0)
-        arrived = {name: {} for name in names}
-        for line in out.read().splitlines():
-            topic, stamp, at_ns, _ = line.split()
-            whole, fraction = stamp.split(".")
-            arrived[topic.split("/")[0]][int(whole) * 1_000_000 + round(int(fraction) / 1000)] = int(at_ns) / 1000
-    sent = received = 0
-    delays = []
-    for name in names:
-        due = [stamp for stamp in services[name].sent if begin <= stamp < end]
-        sent += len(due)
-        delays += [(arrived[name][stamp] - stamp) / 1000 for stamp in due if stamp in arrived[name]]
-    received = len(delays)
+    delays = [(arrivals.at_us[name][stamp] - stamp) / 1000 for name in names for stamp in due[name] if stamp in arrivals.at_us[name]]
+    sent, received = sum(map(len, due.values())), len(delays)
     return {"sent": sent, "received": received, "lost": sent - received, "delays_ms": sorted(delays),
             "cpu_s": resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime + resource.getrusage(resource.RUSAGE_CHILDREN).ru_stime}
+
+
+def once_arrived(arrivals, name, begin, clouds, end):
+    """@return the `confirmed` of a Replay: waits until a cloud has arrived, and ends after so many, or if one is lost"""
+    stamps = []
+
+    def confirmed(stamp):
+        if stamp < begin:
+            return True
+        stamps.append(stamp)
+        if arrivals.wait(lambda at: stamp in at[name]) and len(stamps) < clouds:
+            return True
+        end.set()
+        return False
+    return confirmed
 
 
 def main():
