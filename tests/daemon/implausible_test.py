@@ -8,7 +8,7 @@ import tempfile
 import unittest
 import pathlib
 
-from service import CONFIGURATION, SCENE, Service, slsctl, slsd
+from service import CONFIGURATION, SCENE, Service, slsctl, slsd, wait_until
 
 ADVICE = {"metres": "T looks like metres: multiply it by 1000", "inverted": "R and T look inverted"}
 
@@ -96,7 +96,7 @@ class Implausible(unittest.TestCase):
 
     def test_start_warns(self):
         with Service(configuration=configuration(self.folder, metres)) as service:
-            self.assertIn(ADVICE["metres"], service.log_text())
+            wait_until(lambda: ADVICE["metres"] in service.log_text(), "the warning")
 
     def test_frames_without_a_pattern_say_so(self):
         with Service(camera_path=SCENE / "black.png") as service, service.client() as client:
