@@ -11,7 +11,7 @@ import time
 import urllib.error
 import urllib.request
 
-TIMEOUT_S = 120
+TIMEOUT_S = 600
 ARGUMENTS = ["--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
              "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars",
              "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]

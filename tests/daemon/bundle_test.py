@@ -32,6 +32,7 @@ file = "{corpus}/calibration.yml"
 [decode]
 depth_min_mm = 1500.0
 [scan]
+timeout_ms = 60000
 reopen_first_ms = 20
 reopen_longest_ms = 50
 [server]

@@ -15,7 +15,7 @@ class RpcError(Exception):
 
 
 class Client:
-    def __init__(self, path, timeout=60):
+    def __init__(self, path, timeout=600):
         self.socket = socket.socket(socket.AF_UNIX)
         self.socket.settimeout(timeout)
         self.socket.connect(str(path))

@@ -156,7 +156,7 @@ class Life(unittest.TestCase):
     def test_reload_takes_decode_options_and_names_what_needs_a_restart(self):
         with Service() as service, service.client() as client:
             text = service.file.read_text(encoding="utf-8")
-            changed = text.replace("[scan]", "[scan]\ntimeout_ms = 4000\nprojector_latency_ms = 50.0")
+            changed = text.replace("timeout_ms = 60000", "timeout_ms = 4000\nprojector_latency_ms = 50.0")
             service.file.write_text(changed + "clients_max = 7\n[decode]\ndepth_max_mm = 600.0\n", encoding="utf-8")
             self.assertEqual(client.call("reload")[0], {"needs_restart": ["server", "scan"]})
             self.assertEqual(client.call("scan")[0]["points"], 0)

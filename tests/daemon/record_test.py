@@ -34,6 +34,7 @@ file = "two.yml"
 depth_min_mm = 1500.0
 classify = "default"
 [scan]
+timeout_ms = 60000
 exposure_skew_ms = 10000
 [server]
 socket = "slsd.sock"

@@ -14,7 +14,7 @@ from client import Client
 
 BIN = pathlib.Path(os.environ["SLSD_BIN"])
 SCENE = pathlib.Path(os.environ["SLSD_SCENE"])
-TIMEOUT_S = 120
+TIMEOUT_S = 600  # ends what hangs, also on a busy machine
 REPORTS = ("ThreadSanitizer", "AddressSanitizer", "LeakSanitizer", "runtime error:")
 
 CONFIGURATION = """
@@ -28,6 +28,7 @@ path = "{camera_path}"
 [calibration]
 file = "{scene}/calibration.yml"
 [scan]
+timeout_ms = 60000
 reopen_first_ms = 20
 reopen_longest_ms = 50
 [server]
