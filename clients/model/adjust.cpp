@@ -179,6 +179,11 @@ double apart_mm(std::span<const ModelFrame> frames, const std::vector<Link>& clo
 
 }  // namespace
 
+bool came_round(std::span<const ModelFrame> frames, std::size_t early, std::size_t late) {
+  return late - early >= std::max(kFarApart, frames.size() / 2) &&
+         turn_degrees(frames[early].object_from_rig, frames[late].object_from_rig) < 15;
+}
+
 Adjustment adjust(std::span<ModelFrame> frames) {
   Adjustment done;
   if (frames.empty()) return done;
@@ -186,9 +191,7 @@ Adjustment adjust(std::span<ModelFrame> frames) {
   std::vector<Link> links = links_of(frames, scale);
   std::vector<Link> closing;
   for (const Link& link : links)
-    if (link.b - link.a >= std::max(kFarApart, frames.size() / 2) &&
-        turn_degrees(frames[link.a].object_from_rig, frames[link.b].object_from_rig) < 15)
-      closing.push_back(link);
+    if (came_round(frames, link.a, link.b)) closing.push_back(link);
   done.links = links.size(), done.closed = !closing.empty();
   done.drift_mm = apart_mm(frames, closing);
   for (const double motion_mm : {1.0, 1.0, 0.3, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0})

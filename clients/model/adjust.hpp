@@ -21,6 +21,10 @@ struct Adjustment {
   std::vector<std::optional<double>> fit;  ///< the same for each frame; nothing if no other sees its surface
 };
 
+/// Tells whether a later frame looks at the object from the side of an early one again.
+/// @param early, late  indices of frames @thread reentrant
+[[nodiscard]] bool came_round(std::span<const ModelFrame> frames, std::size_t early, std::size_t late);
+
 /// Moves all frames so that their surfaces meet: one adjustment over all places, of the distances between the surfaces
 /// of each pair of frames that look at the object from similar sides, weighted by 1/sigma^2 of both. The first frame
 /// stays.

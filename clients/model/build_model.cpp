@@ -11,29 +11,16 @@
 
 #include "clients/model/read_cloud.hpp"
 #include "clients/model/tidy_mesh.hpp"
-#include "clients/model/track.hpp"
 #include "clients/model/volume.hpp"
 #include "core/geometry/robust.hpp"
-#include "drivers/files/file.hpp"
 
 namespace slsd::model {
 namespace {
 
-constexpr std::size_t kCloudLimitBytes = std::size_t{1} << 31;
 /// A frame whose surface lies so many sigma off the others', usually, was wrongly tracked.
 constexpr double kGreatestFitAdjusted = 2.5;
 /// Smaller pieces of surface, as a share of it, are taken for stray points.
 constexpr double kSmallestPiece = 0.001;
-
-Result<Shot> read_shot(const RecordedClouds& recorded, const std::string& name, const ModelOptions& options) {
-  const auto bytes = read_file(recorded.folder / name, kCloudLimitBytes);
-  if (!bytes) return tl::unexpected(bytes.error());
-  const auto points = read_cloud(*bytes);
-  if (!points) return tl::unexpected(points.error());
-  auto images = range_images(*points, recorded.calibration, options.box);
-  if (!images) return tl::unexpected(images.error());
-  return make_shot(std::move(*images));
-}
 
 /// Voxels as wide as a pixel sees, or as the usual sigma, if that is more.
 float voxel_for(const Shot& shot) {
@@ -48,35 +35,6 @@ float voxel_for(const Shot& shot) {
   return std::max(median_in_place(sizes), median_in_place(sigmas));
 }
 
-struct Walk {
-  Tracker tracker;
-  ModelReport report;
-  float voxel_mm = 0;
-};
-
-Result<Walk> track_all(const RecordedClouds& recorded, const ModelOptions& options, const Tell& tell) {
-  Walk walk;
-  for (std::size_t number = 0; number < recorded.names.size(); ++number) {
-    const std::string& name = recorded.names[number];
-    ++walk.report.frames;
-    auto shot = read_shot(recorded, name, options);
-    std::string refusal;
-    if (!shot) {
-      if (shot.error().code == ErrorCode::kMismatch && walk.report.frames == 1) return tl::unexpected(shot.error());
-      refusal = shot.error().message;
-    } else {
-      if (walk.voxel_mm == 0) walk.voxel_mm = voxel_for(*shot);
-      const Tracked tracked = walk.tracker.add(number, std::move(*shot));
-      refusal = tracked.refusal;
-      if (tracked.found_again) tell(name + ": found the object again");
-    }
-    if (refusal.empty()) continue;
-    tell(name + ": left out: " + refusal);
-    walk.report.refused.push_back({name, std::move(refusal)});
-  }
-  return walk;
-}
-
 double way_degrees(std::span<const ModelFrame> frames) {
   double sum = 0;
   for (std::size_t i = 1; i < frames.size(); ++i)
@@ -86,21 +44,72 @@ double way_degrees(std::span<const ModelFrame> frames) {
 
 }  // namespace
 
-Result<Model> build_model(const RecordedClouds& recorded, const ModelOptions& options, const Tell& tell) {
-  auto walk = track_all(recorded, options, tell);
-  if (!walk) return tl::unexpected(walk.error());
-  Model model{{}, std::move(walk->report)};
+ModelBuilder::ModelBuilder(Calibration calibration, const ModelOptions& options)
+    : calibration_(std::move(calibration)), options_(options), tracker_(options.step_degrees) {}
+
+Result<Shot> ModelBuilder::read_shot(std::string_view ply) const {
+  const auto points = read_cloud(ply);
+  if (!points) return tl::unexpected(points.error());
+  auto images = range_images(*points, calibration_, options_.box);
+  if (!images) return tl::unexpected(images.error());
+  return make_shot(std::move(*images));
+}
+
+Result<ModelBuilder::Added> ModelBuilder::add(const std::string& name, std::string_view ply) {
+  names_.push_back(name);
+  ++report_.frames;
+  auto shot = read_shot(ply);
+  Added added;
+  if (shot) {
+    if (voxel_mm_ == 0) voxel_mm_ = voxel_for(*shot);
+    Tracked tracked = tracker_.add(names_.size() - 1, std::move(*shot));
+    added = {std::move(tracked.refusal), tracked.found_again};
+  } else {
+    if (shot.error().code == ErrorCode::kMismatch && report_.frames == 1) return tl::unexpected(shot.error());
+    added.refusal = shot.error().message;
+  }
+  if (!added.refusal.empty()) report_.refused.push_back({name, added.refusal});
+  return added;
+}
+
+void ModelBuilder::leave_out(const std::string& name, std::string reason) {
+  names_.push_back(name);
+  ++report_.frames;
+  report_.refused.push_back({name, std::move(reason)});
+}
+
+SeenSides ModelBuilder::sides() const {
+  std::vector<RigidTransform> places;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const ModelFrame& frame : tracker_.frames()) {
+    places.push_back(frame.object_from_rig);
+    middle += frame.object_from_rig.rotation * frame.shot.middle_mm() + frame.object_from_rig.translation;
+  }
+  return seen_sides(places, middle / static_cast<double>(std::max<std::size_t>(1, places.size())));
+}
+
+bool ModelBuilder::closed() const {
+  const std::vector<ModelFrame>& frames = tracker_.frames();
+  if (frames.empty() || !sides().all()) return false;
+  for (std::size_t early = 0; early + 1 < frames.size(); ++early)
+    if (came_round(frames, early, frames.size() - 1)) return true;
+  return false;
+}
+
+Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell) {
+  Model model{{}, std::move(report_)};
   ModelReport& report = model.report;
-  std::vector<ModelFrame>& frames = walk->tracker.frames();
+  std::vector<ModelFrame>& frames = tracker_.frames();
   if (frames.empty())
-    return fail(ErrorCode::kMalformed,
-                "no frame can be used: " + report.refused.front().name + ": " + report.refused.front().reason);
+    return fail(ErrorCode::kMalformed, report.refused.empty() ? "no cloud came"
+                                                              : "no frame can be used: " + report.refused.front().name +
+                                                                    ": " + report.refused.front().reason);
   report.adjustment = adjust(frames);
   report.turned_degrees = way_degrees(frames);
-  report.voxel_mm = options.voxel_mm.value_or(walk->voxel_mm);
+  report.voxel_mm = options_.voxel_mm.value_or(voxel_mm_);
   Volume volume({.voxel_mm = report.voxel_mm, .band_mm = 5 * report.voxel_mm});
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const std::string& name = recorded.names[frames[i].number];
+    const std::string& name = names_[frames[i].number];
     const std::optional<double>& fit = report.adjustment.fit[i];
     if (!fit || *fit > kGreatestFitAdjusted) {
       report.refused.push_back({name, fit ? fmt::format("its surface lies {:.1f} sigma off the others'", *fit)
@@ -108,7 +117,9 @@ Result<Model> build_model(const RecordedClouds& recorded, const ModelOptions& op
       tell(name + ": left out: " + report.refused.back().reason);
       continue;
     }
-    const auto shot = read_shot(recorded, name, options);
+    const auto ply = read(name);
+    if (!ply) return tl::unexpected(ply.error());
+    const auto shot = read_shot(*ply);
     if (!shot) return tl::unexpected(shot.error());
     volume.add(*shot, frames[i].object_from_rig);
     report.fused.push_back({name, frames[i].object_from_rig, *fit});

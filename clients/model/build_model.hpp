@@ -6,11 +6,13 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "clients/model/adjust.hpp"
 #include "clients/model/range_image.hpp"
-#include "clients/model/recorded_clouds.hpp"
+#include "clients/model/seen_sides.hpp"
+#include "clients/model/track.hpp"
 #include "core/mesh/mesh.hpp"
 #include "core/result.hpp"
 
@@ -19,6 +21,7 @@ namespace slsd::model {
 struct ModelOptions {
   std::optional<float> voxel_mm;  ///< nothing: by the clouds' pixels and sigmas
   std::optional<Box> box;         ///< in the rig's frame, mm; points outside are not of the object
+  double step_degrees = 0;        ///< known turn from one cloud to the next, in either direction; 0: unknown
 };
 
 /// A frame that is not in the model, and why.
@@ -53,10 +56,46 @@ struct Model {
 /// Tells of progress: a sentence for the user.
 using Tell = std::function<void(const std::string&)>;
 
-/// Tracks the object through the clouds, adjusts all places at once and fuses the clouds into a mesh in the frame of
-/// the rig at the first frame. Reads each cloud twice, so that memory holds the surface alone.
-/// @errors kMalformed: no frame can be used, or no two show the same place; kMismatch: clouds of another calibration;
-/// of reading files
-[[nodiscard]] Result<Model> build_model(const RecordedClouds& recorded, const ModelOptions& options, const Tell& tell);
+/// Tracks an object through clouds, adjusts all places at once and fuses the clouds into a mesh in the frame of the rig
+/// at the first cloud. Needs each cloud twice, so that memory holds the surface alone.
+/// @thread thread-bound
+class ModelBuilder {
+ public:
+  /// Gives a cloud that was added once more, as PLY.
+  using Read = std::function<Result<std::string>(const std::string& name)>;
+  /// Outcome of a cloud: it has a place unless `refusal` says why not.
+  struct Added {
+    std::string refusal;
+    bool found_again = false;  ///< the cloud before had no place
+  };
+
+  ModelBuilder(Calibration calibration, const ModelOptions& options);
+
+  /// Places one more cloud. @errors kMismatch: the first cloud is of another calibration
+  [[nodiscard]] Result<Added> add(const std::string& name, std::string_view ply);
+
+  /// Notes a cloud that cannot be read.
+  void leave_out(const std::string& name, std::string reason);
+
+  /// The sides from which the object was seen so far.
+  [[nodiscard]] SeenSides sides() const;
+  /// Tells whether the object was seen from all sides, and the end meets the beginning.
+  [[nodiscard]] bool closed() const;
+  [[nodiscard]] std::size_t placed() const { return tracker_.frames().size(); }
+
+  /// Builds the mesh. Ends this object's work.
+  /// @errors kMalformed: no cloud can be used, or no two show the same place; of `read`
+  [[nodiscard]] Result<Model> finish(const Read& read, const Tell& tell);
+
+ private:
+  [[nodiscard]] Result<Shot> read_shot(std::string_view ply) const;
+
+  Calibration calibration_;
+  ModelOptions options_;
+  Tracker tracker_;
+  ModelReport report_;
+  std::vector<std::string> names_;
+  float voxel_mm_ = 0;
+};
 
 }  // namespace slsd::model

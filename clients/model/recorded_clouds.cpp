@@ -17,6 +17,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kLimitBytes = 1U << 28;
+constexpr std::size_t kCloudLimitBytes = std::size_t{1} << 31;
 
 /// Adds the clouds that scans.jsonl names.
 /// @return  whether the last line is whole
@@ -66,6 +67,10 @@ Result<RecordedClouds> read_recording(const std::filesystem::path& folder) {
     recorded.warnings.push_back(
         fmt::format("the recording was cut: its first {} clouds are used", recorded.names.size()));
   return recorded;
+}
+
+Result<std::string> read_recorded(const RecordedClouds& recorded, const std::string& name) {
+  return read_file(recorded.folder / name, kCloudLimitBytes);
 }
 
 }  // namespace slsd::model

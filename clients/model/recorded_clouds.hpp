@@ -26,4 +26,7 @@ struct RecordedClouds {
 /// @errors kNotFound, kMalformed, kPermissionDenied, kIo
 [[nodiscard]] Result<RecordedClouds> read_recording(const std::filesystem::path& folder);
 
+/// Reads one of the clouds. @errors as read_file()
+[[nodiscard]] Result<std::string> read_recorded(const RecordedClouds& recorded, const std::string& name);
+
 }  // namespace slsd::model

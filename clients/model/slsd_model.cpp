@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <poll.h>
+#include <unistd.h>
+
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,10 +14,15 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include <slsd/connection.hpp>
+
 #include "clients/model/build_model.hpp"
+#include "clients/model/live_clouds.hpp"
+#include "clients/model/recorded_clouds.hpp"
 #include "clients/usage/usage.hpp"
 #include "core/mesh/mesh_file.hpp"
 #include "drivers/files/file.hpp"
+#include "drivers/system/interrupt.hpp"
 
 namespace {
 
@@ -68,22 +78,24 @@ std::string to_text(const model::ModelReport& report, const Mesh& mesh) {
 }
 
 struct Options {
-  std::filesystem::path recording, output;
+  std::filesystem::path socket = client::default_socket();
+  std::filesystem::path recording, output, keep;
+  std::vector<float> box_mm;  ///< least x, y, z, then greatest
+  bool until_closed = false, turntable = false;
+  int views = 0;
+  std::optional<double> seconds;
   model::ModelOptions model;
   bool json = false;
 };
 
-int run(const Options& options) {
-  const auto format = mesh_format(lower_extension(options.output).substr(1));
-  if (auto writable = check_writable(options.output); !writable) return failed(writable.error());
-  const auto recorded = model::read_recording(options.recording);
-  if (!recorded) return failed(recorded.error());
-  for (const std::string& warning : recorded->warnings) std::fprintf(stderr, "slsd-model: %s\n", warning.c_str());
-  const auto built = model::build_model(*recorded, options.model, [](const std::string& sentence) {
-    std::fprintf(stderr, "slsd-model: %s\n", sentence.c_str());
-  });
+void tell(const std::string& sentence) {
+  std::fprintf(stderr, "slsd-model: %s\n", sentence.c_str());
+}
+
+int write_model(const Options& options, const Result<model::Model>& built, const std::string& subject) {
   if (!built) return failed(built.error());
-  const auto bytes = write_mesh(built->mesh, *format, "slsd-model of " + options.recording.filename().string());
+  const auto format = mesh_format(lower_extension(options.output).substr(1));
+  const auto bytes = write_mesh(built->mesh, *format, "slsd-model of " + subject);
   if (!bytes) return failed(bytes.error());
   if (auto written = write_file_atomically(options.output, *bytes); !written) return failed(written.error());
   const std::string report =
@@ -91,27 +103,212 @@ int run(const Options& options) {
   return std::fputs(report.c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
 }
 
+int run_recorded(const Options& options) {
+  const auto recorded = model::read_recording(options.recording);
+  if (!recorded) return failed(recorded.error());
+  for (const std::string& warning : recorded->warnings) tell(warning);
+  const auto read = [&recorded](const std::string& name) { return model::read_recorded(*recorded, name); };
+  model::ModelBuilder builder(recorded->calibration, options.model);
+  for (const std::string& name : recorded->names) {
+    const auto ply = read(name);
+    if (!ply) {
+      builder.leave_out(name, ply.error().message);
+      tell(name + ": left out: " + ply.error().message);
+      continue;
+    }
+    const auto added = builder.add(name, *ply);
+    if (!added) return failed(added.error());
+    if (!added->refusal.empty()) tell(name + ": left out: " + added->refusal);
+    if (added->found_again) tell(name + ": found the object again");
+  }
+  return write_model(options, builder.finish(read, tell), options.recording.filename().string());
+}
+
+/// Follows the clouds of a running service until the object was seen from all sides, or a limit or the user ends it.
+class LiveSession {
+ public:
+  LiveSession(const Options& options, model::LiveClouds clouds)
+      : options_(options), clouds_(std::move(clouds)), builder_(clouds_.calibration(), options.model) {}
+
+  int run() {
+    Interrupt::watch();
+    tell(options_.turntable ? "turn to the first view, then press Enter"
+                            : "turn the object; Ctrl-C ends, and writes the model");
+    const Result<> ended = options_.turntable ? follow_turntable() : follow_object();
+    if (terminal_ && !options_.turntable) std::fputs("\n", stderr);
+    if (!ended) {
+      if (builder_.placed() == 0) return failed(ended.error());
+      tell(to_string(ended.error()) + "; the model is of the clouds before that");
+    }
+    if (auto finished = clouds_.finish(); !finished && ended) tell(to_string(finished.error()));
+    const auto read = [this](const std::string& name) { return clouds_.read(name); };
+    const int status = write_model(options_, builder_.finish(read, tell), "clouds of the scanner");
+    return status == 0 && !ended ? 1 : status;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] bool enough() const {
+    if (Interrupt::came()) return true;
+    if (options_.seconds && std::chrono::duration<double>(Clock::now() - begin_).count() >= *options_.seconds)
+      return true;
+    return options_.until_closed && builder_.closed();
+  }
+
+  Result<> follow_object() {
+    if (auto asked = clouds_.request(); !asked) return asked;
+    for (;;) {
+      const auto ply = clouds_.receive();
+      if (!ply) return tl::unexpected(ply.error());
+      const bool ends = enough();
+      // The service takes the next cloud while this one is placed.
+      if (!ends) {
+        if (auto asked = clouds_.request(); !asked) return asked;
+      }
+      if (auto added = add(*ply); !added) return added;
+      if (ends) return {};
+      show_progress();
+      if (!enough()) continue;
+      (void)clouds_.receive();
+      return {};
+    }
+  }
+
+  Result<> follow_turntable() {
+    for (int view = 1; view <= options_.views && wait_for_line(); ++view) {
+      for (bool placed = false; !placed;) {
+        if (auto asked = clouds_.request(); !asked) return asked;
+        const auto ply = clouds_.receive();
+        if (!ply) return tl::unexpected(ply.error());
+        const std::size_t before = builder_.placed();
+        if (auto added = add(*ply); !added) return added;
+        placed = builder_.placed() > before;
+        if (placed) break;
+        tell(fmt::format("view {} of {} was not placed: press Enter to scan it again", view, options_.views));
+        if (!wait_for_line()) return {};
+      }
+      if (view < options_.views)
+        tell(fmt::format("view {0} of {1} is placed; turn by {2:.0f} degrees, then press Enter", view, options_.views,
+                         options_.model.step_degrees));
+    }
+    return {};
+  }
+
+  Result<> add(const std::optional<std::string>& ply) {
+    std::string refusal = ply ? "" : clouds_.problem();
+    if (ply) {
+      auto name = clouds_.keep(*ply);
+      if (!name) return tl::unexpected(name.error());
+      const auto added = builder_.add(*name, *ply);
+      if (!added) return tl::unexpected(added.error());
+      refusal = added->refusal;
+    }
+    // A hand in the way spoils many clouds for one reason: it is said once.
+    if (!refusal.empty() && (reason_.empty() || options_.turntable)) say("left out: " + refusal);
+    if (refusal.empty() && !reason_.empty() && !options_.turntable) say("found the object again");
+    reason_ = std::move(refusal);
+    return {};
+  }
+
+  void say(const std::string& sentence) const {
+    if (terminal_ && !options_.turntable) std::fputs("\n", stderr);
+    tell(sentence);
+  }
+
+  void show_progress() {
+    const std::string sides = to_string(builder_.sides());
+    if (terminal_) {
+      std::fprintf(stderr, "\r%zu clouds; %s   ", builder_.placed(), sides.c_str());
+      return;
+    }
+    const int seen = static_cast<int>(builder_.sides().seen_degrees) / 30;
+    if (seen > told_) tell(fmt::format("{} clouds; {}", builder_.placed(), sides));
+    told_ = std::max(told_, seen);
+  }
+
+  /// @return  false if the input ended, or the user ends the program
+  static bool wait_for_line() {
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    for (;;) {
+      if (Interrupt::came()) return false;
+      const int ready = ::poll(&input, 1, 200);
+      if (ready <= 0) continue;
+      char character = 0;
+      if (::read(STDIN_FILENO, &character, 1) != 1) return false;
+      if (character == '\n') return true;
+    }
+  }
+
+  const Options& options_;
+  model::LiveClouds clouds_;
+  model::ModelBuilder builder_;
+  std::string reason_;
+  bool terminal_ = ::isatty(STDERR_FILENO) != 0;
+  int told_ = 0;
+  Clock::time_point begin_ = Clock::now();
+};
+
+int run_live(const Options& options) {
+  auto clouds = model::LiveClouds::open(
+      options.socket, options.keep.empty() ? std::nullopt : std::optional<std::filesystem::path>(options.keep));
+  if (!clouds) return failed(clouds.error());
+  return LiveSession(options, std::move(*clouds)).run();
+}
+
+int run(Options options) {
+  if (options.box_mm.size() == 6) {
+    const std::vector<float>& box = options.box_mm;
+    options.model.box = model::Box(Eigen::Vector3f(box[0], box[1], box[2]), Eigen::Vector3f(box[3], box[4], box[5]));
+  }
+  if (options.turntable) options.model.step_degrees = 360.0 / options.views;
+  if (auto writable = check_writable(options.output); !writable) return failed(writable.error());
+  return options.recording.empty() ? run_live(options) : run_recorded(options);
+}
+
+void check(const Options& options) {
+  const std::string extension = lower_extension(options.output);
+  if (extension.empty() || !mesh_format(extension.substr(1)))
+    throw CLI::ValidationError("--output", "the file's name ends in .ply, .stl, .obj or .glb");
+  if (options.turntable && options.views == 0)
+    throw CLI::ValidationError("--turntable", "say how many views a full turn has: --views 24");
+  const std::vector<float>& box = options.box_mm;
+  for (std::size_t axis = 0; axis < 3 && !box.empty(); ++axis)
+    if (!(box[axis] < box[axis + 3]))
+      throw CLI::ValidationError("--box", "the first three are the least x, y and z, the others the greatest");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Fuses the clouds of an object that turns in front of the scanner into one mesh.\nExit status: 0 done, 1 no "
-      "model, "
-      "2 wrong usage.",
+      "Fuses the clouds of an object that turns in front of the scanner into one mesh.\n"
+      "Exit status: 0 done, 1 no model or a session that failed, 2 wrong usage.",
       "slsd-model");
   Options options;
   app.set_version_flag("--version", "slsd-model " SLSD_VERSION);
-  app.add_option("--from", options.recording, "the folder of a recording of slsctl that has clouds");
   app.add_option("-o,--output", options.output, "the mesh: .ply, .stl, .obj or .glb");
+  auto* const from =
+      app.add_option("--from", options.recording, "the folder of a recording of slsctl that has clouds; else scan now");
+  const auto live = [&](CLI::Option* option) { return option->excludes(from); };
+  live(app.add_option("--socket", options.socket,
+                      "the service's socket; default: SLSD_SOCKET if set (" + options.socket.string() + ")"));
+  auto* const turntable =
+      live(app.add_flag("--turntable", options.turntable, "scan a view at each line of the standard input, as Enter"));
+  live(app.add_option("--views", options.views, "with --turntable: views of a full turn"))
+      ->check(between(8, 360))
+      ->needs(turntable);
+  live(app.add_flag("--until-closed", options.until_closed, "end when the object was seen from all sides"))
+      ->excludes(turntable);
+  live(app.add_option("--seconds", options.seconds, "end after so many seconds"))
+      ->check(between(0.1, 86400.0))
+      ->excludes(turntable);
+  live(app.add_option("--keep", options.keep, "keep the clouds in this new folder, for --from"));
+  app.add_option("--box", options.box_mm, "use points in this box alone: least x y z, greatest x y z, mm of the rig")
+      ->expected(6);
   app.add_option("--voxel", options.model.voxel_mm, "the mesh's resolution in mm (by the clouds' pixels and sigmas)")
       ->check(between(0.01, 100.0));
   app.add_flag("--json", options.json, "print the report as JSON");
-  const auto check = [&options] {
-    if (options.recording.empty()) throw CLI::ValidationError("--from", "name the folder of a recording");
-    const std::string extension = lower_extension(options.output);
-    if (extension.empty() || !mesh_format(extension.substr(1)))
-      throw CLI::ValidationError("--output", "the file's name ends in .ply, .stl, .obj or .glb");
-  };
-  if (const auto ended = parse_usage(app, argc, argv, check)) return *ended;
+  if (const auto ended = parse_usage(app, argc, argv, [&options] { check(options); })) return *ended;
   return run(options);
 }

@@ -79,6 +79,25 @@ std::optional<Alignment> Tracker::search(const Shot& shot) const {
   return best;
 }
 
+/// Tries the known step about each axis of the rig through the middle of the object, either way.
+std::optional<Alignment> Tracker::step(const Shot& shot) const {
+  std::optional<Alignment> best;
+  const ModelFrame& last = frames_.back();
+  const PlacedShot reference{&last.shot, last.object_from_rig};
+  const Eigen::Vector3d middle = last.shot.middle_mm();
+  for (const int axis : {1, 0, 2}) {
+    for (const double degrees : {step_degrees_, -step_degrees_}) {
+      RigidTransform turn;
+      turn.rotation =
+          Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d::Unit(axis)).toRotationMatrix();
+      turn.translation = middle - turn.rotation * middle;
+      const auto found = align(shot, {&reference, 1}, last.object_from_rig.after(turn));
+      if (found && refusal_of(*found).empty() && (!best || found->pairs > best->pairs)) best = found;
+    }
+  }
+  return best;
+}
+
 Tracked Tracker::begin(const Shot& shot) const {
   const PlacedShot self{&shot, {}};
   auto alignment = align(shot, {&self, 1}, {});
@@ -96,6 +115,9 @@ Tracked Tracker::follow(const Shot& shot) const {
     if (!found) continue;
     refusal = refusal_of(*found);
     if (refusal.empty()) return {found, {}, lost_};
+  }
+  if (step_degrees_ > 0) {
+    if (const auto found = step(shot)) return {found, {}, lost_};
   }
   if (const auto found = search(shot)) return {found, {}, true};
   return {{}, std::move(refusal), false};

@@ -29,6 +29,9 @@ struct ModelFrame {
 /// @thread thread-bound
 class Tracker {
  public:
+  /// @param step_degrees  known turn from one frame to the next, about any axis of the rig; 0: unknown
+  explicit Tracker(double step_degrees = 0) : step_degrees_(step_degrees) {}
+
   /// Places a frame by the latest keyframes, from the last motion on. If that fails, tries all keyframes.
   /// @param number  of the frame, for ModelFrame; greater than the one before
   [[nodiscard]] Tracked add(std::size_t number, Shot shot);
@@ -43,7 +46,9 @@ class Tracker {
   [[nodiscard]] std::optional<Alignment> search(const Shot& shot) const;
   [[nodiscard]] std::vector<PlacedShot> latest_keyframes() const;
   [[nodiscard]] RigidTransform expected() const;
+  [[nodiscard]] std::optional<Alignment> step(const Shot& shot) const;
 
+  double step_degrees_;
   std::vector<ModelFrame> frames_;
   std::vector<std::size_t> keyframes_;  // indices of frames_
   bool lost_ = false;

@@ -2,13 +2,13 @@
 // Copyright the slsd authors
 #include <unistd.h>
 
-#include <array>
 #include <chrono>
 #include <iostream>
 #include <optional>
 
 #include <fmt/format.h>
 
+#include "clients/connection/passing.hpp"
 #include "clients/slsctl/client_commands.hpp"
 #include "clients/slsctl/recording.hpp"
 #include "clients/slsctl/report.hpp"
@@ -24,16 +24,6 @@ using namespace std::chrono_literals;
 
 // Longer than a camera needs to return after it was unplugged, but short enough not to waste a night.
 constexpr auto kTimeout = 60s;
-
-// Errors that pass by themselves, or once a device is plugged in again.
-bool passes(const Failure& failure) {
-  constexpr std::array kPassing{"frame_dropped", "frame_torn", "frame_stale",  "frame_late",
-                                "frame_skewed",  "timeout",    "disconnected", "busy"};
-  for (const char* name : kPassing) {
-    if (failure.error.name == name) return true;
-  }
-  return false;
-}
 
 class Recorder {
  public:
@@ -99,7 +89,7 @@ class Recorder {
   }
 
   [[nodiscard]] std::optional<Failure> keep_failure(const Failure& failure) {
-    if (!passes(failure) || Clock::now() - last_good_ > kTimeout) return failure;
+    if (!passes(failure.error.name) || Clock::now() - last_good_ > kTimeout) return failure;
     if (auto kept = recording_.add_failure(failure.error.to_json()); !kept) return file_failure(kept.error());
     return std::nullopt;
   }

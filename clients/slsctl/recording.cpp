@@ -16,23 +16,6 @@ namespace {
 using nlohmann::json;
 using std::filesystem::path;
 
-Result<> make_folder(const path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) return tl::unexpected(system_error(error.value(), "cannot create the folder", folder));
-  return {};
-}
-
-// An existing folder must be empty, because a replay takes every image in it.
-Result<> check_empty(const path& folder) {
-  std::error_code error;
-  if (!std::filesystem::exists(folder, error)) return {};
-  const bool empty = std::filesystem::is_directory(folder, error) && std::filesystem::is_empty(folder, error);
-  if (error) return tl::unexpected(system_error(error.value(), "cannot read the folder", folder));
-  if (empty) return {};
-  return fail(ErrorCode::kAlreadyExists, "exists and is not an empty folder: name a new one", folder.string());
-}
-
 Result<const Received*> find_frame(const Answered& scan, const std::string& camera) {
   for (const Received& event : scan.events) {
     const bool frame = event.message.value("method", "") == "frame" && event.message.contains("params");
@@ -50,7 +33,8 @@ Recording::Recording(path folder, json settings, bool clouds)
       cameras_(recorded_cameras(settings_)) {}
 
 Result<Recording> Recording::create(const path& folder, json settings, bool clouds) {
-  if (auto empty = check_empty(folder); !empty) return tl::unexpected(empty.error());
+  // A replay takes every image in the folder.
+  if (auto made = make_empty_folder(folder); !made) return tl::unexpected(made.error());
   Recording recording(folder, std::move(settings), clouds);
   if (auto made = recording.make_folders(); !made) return tl::unexpected(made.error());
   if (auto written = recording.write_settings(); !written) return tl::unexpected(written.error());
@@ -60,7 +44,7 @@ Result<Recording> Recording::create(const path& folder, json settings, bool clou
 }
 
 Result<> Recording::make_folders() const {
-  Result<> made = make_folder(folder_);
+  Result<> made;
   for (const RecordedCamera& camera : cameras_) {
     if (made) made = make_folder(folder_ / camera.folder);
   }

@@ -171,4 +171,22 @@ Result<> check_writable(const fs::path& path) {
   return done;
 }
 
+Result<> make_folder(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) return fail_system(error.value(), "cannot create the folder", folder);
+  return {};
+}
+
+Result<> make_empty_folder(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error)) {
+    const bool empty = fs::is_directory(folder, error) && fs::is_empty(folder, error);
+    if (error) return fail_system(error.value(), "cannot read the folder", folder);
+    if (!empty)
+      return fail(ErrorCode::kAlreadyExists, "exists and is not an empty folder: name a new one", folder.string());
+  }
+  return make_folder(folder);
+}
+
 }  // namespace slsd

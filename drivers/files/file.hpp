@@ -33,4 +33,10 @@ namespace slsd {
 /// @errors as write_file_atomically(); a longer file may still not fit on the disk
 [[nodiscard]] Result<> check_writable(const std::filesystem::path& path);
 
+/// Makes a folder, and those above it, unless it is there. @errors kPermissionDenied, kNoSpace, kIo
+[[nodiscard]] Result<> make_folder(const std::filesystem::path& folder);
+
+/// Makes a folder in which nothing lies yet. @errors kAlreadyExists: something lies there; as make_folder()
+[[nodiscard]] Result<> make_empty_folder(const std::filesystem::path& folder);
+
 }  // namespace slsd

@@ -16,6 +16,7 @@ sys.path.insert(0, str(HERE.parent / "daemon"))
 
 import numpy as np  # noqa: E402
 
+from impostor import Impostor, result  # noqa: E402
 from mesh_test import mesh_ply  # noqa: E402
 
 PROGRAM = pathlib.Path(os.environ["SLSD_BIN"]) / "slsd-model"
@@ -213,9 +214,100 @@ class Model(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("the recording was cut: its first 4 clouds are used", done.stderr)
 
+    def scanner(self, clouds, errors=()):
+        """A service whose scans give these clouds, the last one again and again. @param errors  by number of the scan"""
+        asked = []
+
+        def answer(request):
+            if request["method"] == "settings":
+                return result(request, calibration=calibration())
+            self.assertEqual(request["params"], {"format": "ply", "density": "pixels"})
+            number = len(asked)
+            asked.append(request)
+            if number in dict(errors):
+                error = {"code": -32000, "message": "no frame came", "data": {"name": dict(errors)[number]}}
+                return json.dumps({"jsonrpc": "2.0", "id": request["id"], "error": error}).encode() + b"\n"
+            body = clouds(number) if callable(clouds) else clouds[min(number, len(clouds) - 1)]
+            return result(request, body, scan=f"s-{number}", bytes=len(body), format="ply")
+        scanner = Impostor(answer)
+        self.addCleanup(scanner.__exit__)
+        return scanner, asked
+
+    def test_a_running_scanner_is_followed_until_all_sides_were_seen(self):
+        scanner, asked = self.scanner(self.clouds, {4: "frame_dropped"}.items())
+        kept = self.folder / "kept"
+        done = run("--socket", scanner.path, "--until-closed", "-o", self.folder / "live.ply", "--keep", kept, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        report = json.loads(done.stdout)
+        self.assertTrue(report["closed"])
+        self.assertEqual(report["refused"], [])
+        self.assertEqual(len(report["fused"]), 29)  # of 30 scans one failed; the last looks from 12 degrees off the first
+        self.assertIn("left out: no frame came", done.stderr)
+        self.assertIn("found the object again", done.stderr)
+        self.assertRegex(done.stderr, r"seen \d+ of 360 degrees; missing: \d+ to 360 degrees on from the first view")
+        self.assertLess(np.quantile(abs(off_truth_mm(mesh_ply((self.folder / "live.ply").read_bytes())[0])), 0.95), 0.13)
+        again = run("--from", kept, "-o", self.folder / "again.ply", "--json")
+        self.assertEqual(json.loads(again.stdout), report)
+        self.assertEqual((self.folder / "again.ply").read_bytes().split(b"end_header")[1],
+                         (self.folder / "live.ply").read_bytes().split(b"end_header")[1])
+
+    def test_a_turntable_is_scanned_at_each_line(self):
+        """Its first step of 30 degrees is more than the tracker follows unaided."""
+        views = [cloud(bumpy_ball, degrees, degrees) for degrees in range(0, 360, 30)]
+        scanner, asked = self.scanner(views)
+        done = subprocess.run((PROGRAM, "--socket", scanner.path, "--turntable", "--views", "12", "-o", self.folder / "t.ply",
+                               "--json"), input="\n" * 12, capture_output=True, text=True, timeout=600, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(len(asked), 12)
+        self.assertEqual(len(json.loads(done.stdout)["fused"]), 12)
+        self.assertIn("view 11 of 12 is placed; turn by 30 degrees, then press Enter", done.stderr)
+        self.assertLess(np.quantile(abs(off_truth_mm(mesh_ply((self.folder / "t.ply").read_bytes())[0])), 0.95), 0.15)
+
+    def test_a_session_that_cannot_go_on_writes_the_model_so_far(self):
+        scanner, _ = self.scanner(self.clouds[:6], {6: "not_calibrated"}.items())
+        done = run("--socket", scanner.path, "-o", self.folder / "so_far.ply", "--json")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("no frame came; the model is of the clouds before that", done.stderr)
+        self.assertEqual(len(json.loads(done.stdout)["fused"]), 6)
+
+    def test_a_cloud_that_cannot_be_kept_ends_with_the_model_so_far(self):
+        """As on a full disk: a folder is where the sixth cloud should be."""
+        kept = self.folder / "full"
+
+        def clouds(number):
+            if number == 5:
+                (kept / "clouds/00000005.ply").mkdir()
+            return self.clouds[number]
+        scanner, _ = self.scanner(clouds)
+        done = run("--socket", scanner.path, "-o", self.folder / "full.ply", "--keep", kept, "--json")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, "00000005.ply.*; the model is of the clouds before that")
+        self.assertEqual(len(json.loads(done.stdout)["fused"]), 5)
+
+    def test_a_box_leaves_out_what_lies_beside(self):
+        rows = [cloud(bumpy_ball, degrees, degrees) for degrees in (0, 12, 24)]
+        boxed = record(self.folder / "boxed", rows)
+        done = run("--from", boxed, "-o", self.folder / "half.ply", "--box", -100, 0, 500, 100, 100, 700)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        points, _ = mesh_ply((self.folder / "half.ply").read_bytes())
+        self.assertGreater(points["y"].min(), -3)
+        self.assertLess(abs(points["y"].max() - 50), 8)
+
+    def test_no_service_and_a_folder_in_use_say_so(self):
+        done = run("--socket", self.folder / "none.sock", "-o", self.folder / "none.ply")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("none.sock", done.stderr)
+        scanner, _ = self.scanner(self.clouds)
+        done = run("--socket", scanner.path, "-o", self.folder / "none.ply", "--keep", self.turning)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("exists and is not an empty folder", done.stderr)
+        self.assertFalse((self.folder / "none.ply").exists())
+
     def test_wrong_usage(self):
-        cases = {(): "--from", ("--from", "x"): "--output", ("--from", "x", "-o", "a.txt"): ".ply, .stl, .obj or .glb",
-                 ("--from", "x", "-o", "a.ply", "--voxel", "0"): "0.01"}
+        cases = {("--from", "x"): "--output", ("--from", "x", "-o", "a.txt"): ".ply, .stl, .obj or .glb",
+                 ("--from", "x", "-o", "a.ply", "--voxel", "0"): "0.01", ("-o", "a.ply", "--turntable"): "--views",
+                 ("-o", "a.ply", "--from", "x", "--until-closed"): "--from",
+                 ("-o", "a.ply", "--box", "1", "0", "0", "0", "1", "1"): "the least x, y and z"}
         for arguments, expected in cases.items():
             with self.subTest(arguments=arguments):
                 done = run(*arguments)

@@ -24,7 +24,7 @@ Result<> failed(const path& where, const std::error_code& error) {
   return fail(code, error.message() + ": choose another folder with --record", where.string());
 }
 
-Result<> make_folder(const path& folder) {
+Result<> make_pose_folder(const path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   return error ? failed(folder, error) : Result<>();
@@ -37,7 +37,7 @@ Result<> write_picture(const path& file, const GreyImage& picture) {
 }
 
 Result<> write_pictures(const path& folder, const CapturedPictures& pictures) {
-  if (auto made = make_folder(folder); !made) return made;
+  if (auto made = make_pose_folder(folder); !made) return made;
   if (auto white = write_picture(folder / "white.png", pictures.white); !white) return white;
   for (std::size_t i = 0; i < pictures.coded.size(); ++i) {
     const std::string name = pictures.black ? fmt::format("gray_{:02}.png", i) : "pattern.png";
@@ -72,7 +72,7 @@ Result<PoseRecorder> PoseRecorder::create(path folder, std::vector<std::string> 
 
 Result<> PoseRecorder::begin() {
   if (begun_) return {};
-  if (auto made = make_folder(folder_); !made) return made;
+  if (auto made = make_pose_folder(folder_); !made) return made;
   if (auto written = write_file_atomically(folder_ / "pattern.toml", pattern_); !written) return written;
   begun_ = true;
   return {};
