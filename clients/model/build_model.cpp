@@ -35,6 +35,18 @@ float voxel_for(const Shot& shot) {
   return std::max(median_in_place(sizes), median_in_place(sigmas));
 }
 
+/// Share of the area whose triangles have a vertex that no cloud measured.
+double invented_share(const Mesh& mesh) {
+  double all = 0, invented = 0;
+  for (const auto& triangle : mesh.triangles) {
+    const Eigen::Vector3f& first = mesh.vertices_mm[triangle[0]];
+    const double area = (mesh.vertices_mm[triangle[1]] - first).cross(mesh.vertices_mm[triangle[2]] - first).norm() / 2;
+    all += area;
+    if (std::ranges::any_of(triangle, [&](std::uint32_t vertex) { return mesh.frames[vertex] == 0; })) invented += area;
+  }
+  return all > 0 ? invented / all : 0;
+}
+
 double way_degrees(std::span<const ModelFrame> frames) {
   double sum = 0;
   for (std::size_t i = 1; i < frames.size(); ++i)
@@ -124,13 +136,15 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell) {
     volume.add(*shot, frames[i].object_from_rig);
     report.fused.push_back({name, frames[i].object_from_rig, *fit});
   }
-  model.mesh = tidy(volume.mesh(), kSmallestPiece);
+  model.mesh = tidy(options_.close ? volume.closed_mesh() : volume.mesh(), kSmallestPiece);
   if (model.mesh.triangles.empty())
     return fail(
         ErrorCode::kMalformed,
         "no place was measured by two clouds: record more, and turn the object by at most 15 degrees between two");
   report.volume_bytes = volume.bytes();
+  report.invented_share = invented_share(model.mesh);
   std::vector<float> sigmas = model.mesh.sigma_mm;
+  std::erase_if(sigmas, [](float sigma) { return std::isnan(sigma); });
   report.usual_sigma_mm = static_cast<double>(median_in_place(sigmas));
   return model;
 }

@@ -21,6 +21,7 @@ namespace slsd::model {
 struct ModelOptions {
   std::optional<float> voxel_mm;  ///< nothing: by the clouds' pixels and sigmas
   std::optional<Box> box;         ///< in the rig's frame, mm; points outside are not of the object
+  bool close = false;             ///< invent surface where none was measured, so that the mesh has no holes
   double step_degrees = 0;        ///< known turn from one cloud to the next, in either direction; 0: unknown
 };
 
@@ -44,7 +45,8 @@ struct ModelReport {
   Adjustment adjustment;
   float voxel_mm = 0;
   std::size_t volume_bytes = 0;
-  double usual_sigma_mm = 0;  ///< of the mesh's vertices
+  double usual_sigma_mm = 0;  ///< of the mesh's measured vertices
+  double invented_share = 0;  ///< of the mesh's area: no cloud measured it
   double turned_degrees = 0;  ///< all the way
 };
 

@@ -60,7 +60,8 @@ nlohmann::json to_json(const model::ModelReport& report, const Mesh& mesh) {
                       {"volume_bytes", report.volume_bytes},
                       {"vertices", mesh.vertices_mm.size()},
                       {"triangles", mesh.triangles.size()},
-                      {"sigma_mm", report.usual_sigma_mm}};
+                      {"sigma_mm", report.usual_sigma_mm},
+                      {"invented_share", report.invented_share}};
   if (adjustment.closed) json["drift_mm"] = adjustment.drift_mm, json["seam_mm"] = adjustment.seam_mm;
   return json;
 }
@@ -73,6 +74,9 @@ std::string to_text(const model::ModelReport& report, const Mesh& mesh) {
   text += adjustment.closed ? fmt::format("closed: {:.3f} mm of drift before, {:.3f} mm of seam after\n",
                                           adjustment.drift_mm, adjustment.seam_mm)
                             : "not closed: no frame at the end shows what one at the beginning shows\n";
+  if (report.invented_share > 0)
+    text += fmt::format("invented to close it: {:.1f} % of the surface, where PLY has frames 0\n",
+                        100 * report.invented_share);
   return text + fmt::format("mesh: {} triangles, usual sigma {:.3f} mm, voxels of {:.2f} mm\n", mesh.triangles.size(),
                             report.usual_sigma_mm, report.voxel_mm);
 }
@@ -308,6 +312,8 @@ int main(int argc, char** argv) {
       ->expected(6);
   app.add_option("--voxel", options.model.voxel_mm, "the mesh's resolution in mm (by the clouds' pixels and sigmas)")
       ->check(between(0.01, 100.0));
+  app.add_flag("--close", options.model.close,
+               "close the holes, as for printing: invent surface where none was measured");
   app.add_flag("--json", options.json, "print the report as JSON");
   if (const auto ended = parse_usage(app, argc, argv, [&options] { check(options); })) return *ended;
   return run(options);

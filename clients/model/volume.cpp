@@ -14,6 +14,8 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/Geometry>
 
+#include "clients/model/close_field.hpp"
+
 namespace slsd::model {
 namespace {
 
@@ -24,6 +26,8 @@ using FactsLeaf = openvdb::Int32Tree::LeafNodeType;
 constexpr int kLeafSide = 8;
 /// A voxel that more frames saw through than measured is empty.
 constexpr unsigned kSeenThrough = 1;
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+constexpr float kInventedIntensity = 128;
 
 /// Besides its distance and weight, what is known of a voxel.
 struct VoxelFacts {
@@ -196,6 +200,16 @@ struct Volume::Grids {
   [[nodiscard]] Leaves touch(const Coord& at) {
     return {distance.tree().touchLeaf(at), weight.tree().touchLeaf(at), facts.tree().touchLeaf(at)};
   }
+  /// Calls visit(leaf of the field, offset, distance, facts) for each voxel that light met or passed.
+  template <class Visit>
+  void visit(Visit&& visit, openvdb::FloatGrid& field) const {
+    for (auto leaf = distance.tree().cbeginLeaf(); leaf; ++leaf) {
+      const FactsLeaf* const about = facts.tree().probeConstLeaf(leaf->origin());
+      FloatLeaf* const to = field.tree().touchLeaf(leaf->origin());
+      for (auto voxel = about->cbeginValueOn(); voxel; ++voxel)
+        visit(*to, voxel.pos(), leaf->getValue(voxel.pos()), VoxelFacts::of(*voxel));
+    }
+  }
   [[nodiscard]] std::vector<Leaves> leaves() {
     std::vector<Leaves> all;
     for (auto leaf = distance.tree().beginLeaf(); leaf; ++leaf) all.push_back(touch(leaf->origin()));
@@ -285,43 +299,15 @@ class VertexReader {
   unsigned fewest_frames_;
 };
 
-}  // namespace
-
-Mesh Volume::mesh() const {
-  // Outside of the band is far outside: what is not measured must have one sign.
-  openvdb::FloatGrid field(options_.band_mm);
-  for (auto leaf = grids_->distance.tree().cbeginLeaf(); leaf; ++leaf) {
-    const FactsLeaf* const facts = grids_->facts.tree().probeConstLeaf(leaf->origin());
-    FloatLeaf* const to = field.tree().touchLeaf(leaf->origin());
-    for (auto voxel = leaf->cbeginValueOn(); voxel; ++voxel)
-      if (!VoxelFacts::of(facts->getValue(voxel.pos())).empty()) to->setValueOn(voxel.pos(), *voxel);
-  }
-  std::vector<openvdb::Vec3s> points;
-  std::vector<openvdb::Vec4I> quads;
-  openvdb::tools::volumeToMesh(field, points, quads);
-
-  Mesh mesh;
-  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> kept(points.size(), kNone);
-  VertexReader reader(grids_->weight, grids_->facts, options_.fewest_frames);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const Eigen::Vector3f voxel(points[i].x(), points[i].y(), points[i].z());
-    const auto vertex = reader.read(voxel);
-    if (!vertex) continue;
-    kept[i] = static_cast<std::uint32_t>(mesh.vertices_mm.size());
-    mesh.vertices_mm.push_back(voxel * options_.voxel_mm);
-    mesh.sigma_mm.push_back(vertex->sigma_mm);
-    mesh.frames.push_back(static_cast<std::uint16_t>(std::lround(vertex->frames)));
-    mesh.intensity.push_back(static_cast<std::uint8_t>(std::lround(vertex->intensity)));
-  }
+/// Cuts quads along their shorter diagonal.
+/// @param vertex  of each of their corners; kNone: the quad is left out
+void add_quads(const std::vector<openvdb::Vec4I>& quads, const std::vector<std::uint32_t>& vertex, Mesh& mesh) {
   for (const openvdb::Vec4I& quad : quads) {
     std::array<std::uint32_t, 4> corner;
-    for (int i = 0; i < 4; ++i) corner[static_cast<std::size_t>(i)] = kept[quad[i]];
+    for (int i = 0; i < 4; ++i) corner[static_cast<std::size_t>(i)] = vertex[quad[i]];
     if (std::ranges::find(corner, kNone) != corner.end()) continue;
-    const auto length = [&](int from, int to) {
-      return (mesh.vertices_mm[corner[static_cast<std::size_t>(from)]] -
-              mesh.vertices_mm[corner[static_cast<std::size_t>(to)]])
-          .squaredNorm();
+    const auto length = [&](std::size_t from, std::size_t to) {
+      return (mesh.vertices_mm[corner[from]] - mesh.vertices_mm[corner[to]]).squaredNorm();
     };
     if (length(0, 2) < length(1, 3)) {
       mesh.triangles.push_back({corner[0], corner[1], corner[2]});
@@ -331,7 +317,55 @@ Mesh Volume::mesh() const {
       mesh.triangles.push_back({corner[1], corner[2], corner[3]});
     }
   }
+}
+
+/// Extracts the surface of a field. @param invent  also where nothing was measured
+Mesh extract(const openvdb::FloatGrid& field, VertexReader reader, float voxel_mm, bool invent) {
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec4I> quads;
+  openvdb::tools::volumeToMesh(field, points, quads);
+  Mesh mesh;
+  std::vector<std::uint32_t> kept(points.size(), kNone);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f voxel(points[i].x(), points[i].y(), points[i].z());
+    auto vertex = reader.read(voxel);
+    if (!vertex && !invent) continue;
+    if (!vertex) vertex = {std::numeric_limits<float>::quiet_NaN(), 0, kInventedIntensity};
+    kept[i] = static_cast<std::uint32_t>(mesh.vertices_mm.size());
+    mesh.vertices_mm.push_back(voxel * voxel_mm);
+    mesh.sigma_mm.push_back(vertex->sigma_mm);
+    mesh.frames.push_back(static_cast<std::uint16_t>(std::lround(vertex->frames)));
+    mesh.intensity.push_back(static_cast<std::uint8_t>(std::lround(vertex->intensity)));
+  }
+  add_quads(quads, kept, mesh);
   return mesh;
+}
+
+}  // namespace
+
+Mesh Volume::mesh() const {
+  // Outside of the band is far outside: what is not measured must have one sign.
+  openvdb::FloatGrid field(options_.band_mm);
+  grids_->visit(
+      [&](FloatLeaf& to, openvdb::Index at, float distance_mm, const VoxelFacts& facts) {
+        if (!facts.empty()) to.setValueOn(at, distance_mm);
+      },
+      field);
+  return extract(field, {grids_->weight, grids_->facts, options_.fewest_frames}, options_.voxel_mm, false);
+}
+
+Mesh Volume::closed_mesh() const {
+  openvdb::FloatGrid known(options_.band_mm);
+  grids_->visit(
+      [&](FloatLeaf& to, openvdb::Index at, float distance_mm, const VoxelFacts& facts) {
+        if (facts.empty()) {
+          if (facts.passed > 1) to.setValueOn(at, options_.band_mm);
+        } else if (facts.measured >= options_.fewest_frames) {
+          to.setValueOn(at, distance_mm);
+        }
+      },
+      known);
+  return extract(*close_field(known), {grids_->weight, grids_->facts, options_.fewest_frames}, options_.voxel_mm, true);
 }
 
 }  // namespace slsd::model

@@ -37,6 +37,8 @@ class Volume {
 
   /// The surface in the object's frame, with sigma, number of frames and intensity for each vertex.
   [[nodiscard]] Mesh mesh() const;
+  /// The same without holes: a surface is invented where none was measured. There `frames` is 0 and `sigma_mm` NaN.
+  [[nodiscard]] Mesh closed_mesh() const;
 
   [[nodiscard]] std::size_t voxels() const;
   [[nodiscard]] std::size_t bytes() const;

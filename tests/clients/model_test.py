@@ -158,6 +158,27 @@ class Model(unittest.TestCase):
         self.assertGreater(len(rim), 20)
         self.assertGreater(np.quantile(abs(rim[:, 1]), 0.1), 40)
 
+    def test_a_closed_mesh_has_no_holes_and_marks_what_is_invented(self):
+        done = run("--from", self.turning, "--close", "-o", self.folder / "closed.ply", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        points, triangles = mesh_ply((self.folder / "closed.ply").read_bytes())
+        directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        self.assertEqual(np.unique(directed, axis=0, return_counts=True)[1].max(), 1)
+        self.assertEqual(set(np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)[1]), {2})
+        at = np.stack([points[axis] for axis in "xyz"], -1).astype(float) - MIDDLE
+        corners = at[triangles]
+        volume = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6
+        v = np.mgrid[-60:61:2, -60:61:2, -60:61:2].reshape(3, -1).T.astype(float)
+        self.assertAlmostEqual(volume / ((bumpy_ball(v) < 0).sum() * 8), 1, delta=0.05)  # the poles are invented
+        measured = points["frames"] > 0
+        self.assertTrue(np.isnan(points["sigma_mm"][~measured]).all())
+        self.assertTrue((points["sigma_mm"][measured] > 0).all())
+        self.assertLess(np.quantile(abs(off_truth_mm(points[measured])), 0.95), 0.13)
+        self.assertGreater(np.quantile(abs(at[~measured, 1]), 0.1), 35)  # they lie at the poles
+        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        self.assertAlmostEqual(json.loads(done.stdout)["invented_share"],
+                               areas[~measured[triangles].all(axis=1)].sum() / areas.sum(), delta=0.001)
+
     def test_the_report_is_true(self):
         self.assertEqual((self.report["frames"], len(self.report["fused"]), self.report["refused"]), (30, 30, []))
         self.assertTrue(self.report["closed"])
