@@ -1,9 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include <poll.h>
-#include <unistd.h>
-
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -17,7 +13,7 @@
 #include <slsd/connection.hpp>
 
 #include "clients/model/build_model.hpp"
-#include "clients/model/live_clouds.hpp"
+#include "clients/model/live_session.hpp"
 #include "clients/model/recorded_clouds.hpp"
 #include "clients/usage/usage.hpp"
 #include "core/mesh/mesh_file.hpp"
@@ -85,9 +81,8 @@ struct Options {
   std::filesystem::path socket = client::default_socket();
   std::filesystem::path recording, output, keep;
   std::vector<float> box_mm;  ///< least x, y, z, then greatest
-  bool until_closed = false, turntable = false;
-  int views = 0;
-  std::optional<double> seconds;
+  bool turntable = false;
+  model::LiveOptions live;
   model::ModelOptions model;
   bool json = false;
 };
@@ -128,136 +123,19 @@ int run_recorded(const Options& options) {
   return write_model(options, builder.finish(read, tell), options.recording.filename().string());
 }
 
-/// Follows the clouds of a running service until the object was seen from all sides, or a limit or the user ends it.
-class LiveSession {
- public:
-  LiveSession(const Options& options, model::LiveClouds clouds)
-      : options_(options), clouds_(std::move(clouds)), builder_(clouds_.calibration(), options.model) {}
-
-  int run() {
-    Interrupt::watch();
-    tell(options_.turntable ? "turn to the first view, then press Enter"
-                            : "turn the object; Ctrl-C ends, and writes the model");
-    const Result<> ended = options_.turntable ? follow_turntable() : follow_object();
-    if (terminal_ && !options_.turntable) std::fputs("\n", stderr);
-    if (!ended) {
-      if (builder_.placed() == 0) return failed(ended.error());
-      tell(to_string(ended.error()) + "; the model is of the clouds before that");
-    }
-    if (auto finished = clouds_.finish(); !finished && ended) tell(to_string(finished.error()));
-    const auto read = [this](const std::string& name) { return clouds_.read(name); };
-    const int status = write_model(options_, builder_.finish(read, tell), "clouds of the scanner");
-    return status == 0 && !ended ? 1 : status;
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  [[nodiscard]] bool enough() const {
-    if (Interrupt::came()) return true;
-    if (options_.seconds && std::chrono::duration<double>(Clock::now() - begin_).count() >= *options_.seconds)
-      return true;
-    return options_.until_closed && builder_.closed();
-  }
-
-  Result<> follow_object() {
-    if (auto asked = clouds_.request(); !asked) return asked;
-    for (;;) {
-      const auto ply = clouds_.receive();
-      if (!ply) return tl::unexpected(ply.error());
-      const bool ends = enough();
-      // The service takes the next cloud while this one is placed.
-      if (!ends) {
-        if (auto asked = clouds_.request(); !asked) return asked;
-      }
-      if (auto added = add(*ply); !added) return added;
-      if (ends) return {};
-      show_progress();
-      if (!enough()) continue;
-      (void)clouds_.receive();
-      return {};
-    }
-  }
-
-  Result<> follow_turntable() {
-    for (int view = 1; view <= options_.views && wait_for_line(); ++view) {
-      for (bool placed = false; !placed;) {
-        if (auto asked = clouds_.request(); !asked) return asked;
-        const auto ply = clouds_.receive();
-        if (!ply) return tl::unexpected(ply.error());
-        const std::size_t before = builder_.placed();
-        if (auto added = add(*ply); !added) return added;
-        placed = builder_.placed() > before;
-        if (placed) break;
-        tell(fmt::format("view {} of {} was not placed: press Enter to scan it again", view, options_.views));
-        if (!wait_for_line()) return {};
-      }
-      if (view < options_.views)
-        tell(fmt::format("view {0} of {1} is placed; turn by {2:.0f} degrees, then press Enter", view, options_.views,
-                         options_.model.step_degrees));
-    }
-    return {};
-  }
-
-  Result<> add(const std::optional<std::string>& ply) {
-    std::string refusal = ply ? "" : clouds_.problem();
-    if (ply) {
-      auto name = clouds_.keep(*ply);
-      if (!name) return tl::unexpected(name.error());
-      const auto added = builder_.add(*name, *ply);
-      if (!added) return tl::unexpected(added.error());
-      refusal = added->refusal;
-    }
-    // A hand in the way spoils many clouds for one reason: it is said once.
-    if (!refusal.empty() && (reason_.empty() || options_.turntable)) say("left out: " + refusal);
-    if (refusal.empty() && !reason_.empty() && !options_.turntable) say("found the object again");
-    reason_ = std::move(refusal);
-    return {};
-  }
-
-  void say(const std::string& sentence) const {
-    if (terminal_ && !options_.turntable) std::fputs("\n", stderr);
-    tell(sentence);
-  }
-
-  void show_progress() {
-    const std::string sides = to_string(builder_.sides());
-    if (terminal_) {
-      std::fprintf(stderr, "\r%zu clouds; %s   ", builder_.placed(), sides.c_str());
-      return;
-    }
-    const int seen = static_cast<int>(builder_.sides().seen_degrees) / 30;
-    if (seen > told_) tell(fmt::format("{} clouds; {}", builder_.placed(), sides));
-    told_ = std::max(told_, seen);
-  }
-
-  /// @return  false if the input ended, or the user ends the program
-  static bool wait_for_line() {
-    pollfd input{STDIN_FILENO, POLLIN, 0};
-    for (;;) {
-      if (Interrupt::came()) return false;
-      const int ready = ::poll(&input, 1, 200);
-      if (ready <= 0) continue;
-      char character = 0;
-      if (::read(STDIN_FILENO, &character, 1) != 1) return false;
-      if (character == '\n') return true;
-    }
-  }
-
-  const Options& options_;
-  model::LiveClouds clouds_;
-  model::ModelBuilder builder_;
-  std::string reason_;
-  bool terminal_ = ::isatty(STDERR_FILENO) != 0;
-  int told_ = 0;
-  Clock::time_point begin_ = Clock::now();
-};
-
 int run_live(const Options& options) {
   auto clouds = model::LiveClouds::open(
       options.socket, options.keep.empty() ? std::nullopt : std::optional<std::filesystem::path>(options.keep));
   if (!clouds) return failed(clouds.error());
-  return LiveSession(options, std::move(*clouds)).run();
+  Interrupt::watch();
+  model::LiveSession session(std::move(*clouds), options.model, options.live, tell);
+  const Result<> ended = session.follow();
+  if (!ended) {
+    if (session.placed() == 0) return failed(ended.error());
+    tell(to_string(ended.error()) + "; the model is of the clouds before that");
+  }
+  const int status = write_model(options, session.finish(), "clouds of the scanner");
+  return status == 0 && !ended ? 1 : status;
 }
 
 int run(Options options) {
@@ -265,7 +143,7 @@ int run(Options options) {
     const std::vector<float>& box = options.box_mm;
     options.model.box = model::Box(Eigen::Vector3f(box[0], box[1], box[2]), Eigen::Vector3f(box[3], box[4], box[5]));
   }
-  if (options.turntable) options.model.step_degrees = 360.0 / options.views;
+  if (options.turntable) options.model.step_degrees = 360.0 / options.live.views;
   if (auto writable = check_writable(options.output); !writable) return failed(writable.error());
   return options.recording.empty() ? run_live(options) : run_recorded(options);
 }
@@ -274,7 +152,7 @@ void check(const Options& options) {
   const std::string extension = lower_extension(options.output);
   if (extension.empty() || !mesh_format(extension.substr(1)))
     throw CLI::ValidationError("--output", "the file's name ends in .ply, .stl, .obj or .glb");
-  if (options.turntable && options.views == 0)
+  if (options.turntable && options.live.views == 0)
     throw CLI::ValidationError("--turntable", "say how many views a full turn has: --views 24");
   const std::vector<float>& box = options.box_mm;
   for (std::size_t axis = 0; axis < 3 && !box.empty(); ++axis)
@@ -299,12 +177,12 @@ int main(int argc, char** argv) {
                       "the service's socket; default: SLSD_SOCKET if set (" + options.socket.string() + ")"));
   auto* const turntable =
       live(app.add_flag("--turntable", options.turntable, "scan a view at each line of the standard input, as Enter"));
-  live(app.add_option("--views", options.views, "with --turntable: views of a full turn"))
+  live(app.add_option("--views", options.live.views, "with --turntable: views of a full turn"))
       ->check(between(8, 360))
       ->needs(turntable);
-  live(app.add_flag("--until-closed", options.until_closed, "end when the object was seen from all sides"))
+  live(app.add_flag("--until-closed", options.live.until_closed, "end when the object was seen from all sides"))
       ->excludes(turntable);
-  live(app.add_option("--seconds", options.seconds, "end after so many seconds"))
+  live(app.add_option("--seconds", options.live.seconds, "end after so many seconds"))
       ->check(between(0.1, 86400.0))
       ->excludes(turntable);
   live(app.add_option("--keep", options.keep, "keep the clouds in this new folder, for --from"));

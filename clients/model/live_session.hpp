@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <optional>
+#include <string>
+
+#include "clients/model/build_model.hpp"
+#include "clients/model/live_clouds.hpp"
+#include "core/result.hpp"
+
+namespace slsd::model {
+
+struct LiveOptions {
+  int views = 0;  ///< of a turntable, each scanned at a line of the standard input; 0: the object turns freely
+  bool until_closed = false;      ///< ends when the object was seen from all sides
+  std::optional<double> seconds;  ///< the longest time
+};
+
+/// Follows an object through the clouds of a running service, and tells what it still has to see.
+/// @thread thread-bound
+class LiveSession {
+ public:
+  LiveSession(LiveClouds clouds, const ModelOptions& model, const LiveOptions& options, Tell tell);
+
+  /// Follows until a limit or the user ends it (Interrupt). @errors of LiveClouds
+  [[nodiscard]] Result<> follow();
+  [[nodiscard]] std::size_t placed() const { return builder_.placed(); }
+  /// Builds the model of the clouds so far. @errors as ModelBuilder::finish()
+  [[nodiscard]] Result<Model> finish();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] Result<> follow_object();
+  [[nodiscard]] Result<> follow_turntable();
+  [[nodiscard]] Result<> scan_view(int view);
+  [[nodiscard]] Result<> add(const std::optional<std::string>& ply);
+  [[nodiscard]] bool enough() const;
+  void say(const std::string& sentence);
+  void show_progress();
+
+  LiveClouds clouds_;
+  ModelBuilder builder_;
+  LiveOptions options_;
+  Tell tell_;
+  std::string reason_;  // why the latest cloud has no place
+  bool input_ended_ = false;
+  bool progress_ = false;  // a line of progress is not ended
+  int told_ = 0;           // of 12 sectors
+  Clock::time_point begin_ = Clock::now();
+};
+
+}  // namespace slsd::model
