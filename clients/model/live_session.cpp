@@ -34,7 +34,7 @@ LiveSession::LiveSession(LiveClouds clouds, const ModelOptions& model, const Liv
     : clouds_(std::move(clouds)), builder_(clouds_.calibration(), model), options_(options), tell_(std::move(tell)) {}
 
 Result<> LiveSession::follow() {
-  const Result<> ended = options_.views > 0 ? follow_turntable() : follow_object();
+  Result<> ended = options_.views > 0 ? follow_turntable() : follow_object();
   if (std::exchange(progress_, false)) std::fputs("\n", stderr);
   if (!ended) return ended;
   return clouds_.finish();
