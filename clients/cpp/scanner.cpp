@@ -186,6 +186,9 @@ Cloud Scanner::scan(const ScanOptions& options) {
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;
   if (!options.preset.empty()) params["preset"] = options.preset;
+  if (!options.coordinate_frame.empty()) params["coordinate_frame"] = options.coordinate_frame;
+  if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose;
+  if (!options.poses.empty()) params["poses"] = options.poses;
   if (options.picture) params["picture"] = true;
   if (options.why) params["why"] = true;
   if (options.frames) params["frames"] = "raw";

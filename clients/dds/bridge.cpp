@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
+#include <iterator>
 #include <list>
 #include <mutex>
 #include <stop_token>
@@ -48,6 +49,20 @@ Result<std::string> calibration_in_force(const std::string& socket) {
   } catch (const json::exception& error) {
     return fail(ErrorCode::kIo, std::string("the service sent invalid settings: ") + error.what());
   }
+}
+
+/// base_from_rig of a cloud's description; nothing in the rig's frame.
+std::optional<RigidTransform> base_from_rig_of(const json& told) {
+  const json matrix = told.is_object() ? told.value("base_from_rig", json()) : json();
+  const auto is_number = [](const json& each) { return each.is_number(); };
+  if (!matrix.is_array() || matrix.size() != 16 || !std::all_of(matrix.begin(), matrix.end(), is_number)) return {};
+  RigidTransform base_from_rig;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3; ++column)
+      base_from_rig.rotation(static_cast<int>(row), static_cast<int>(column)) = matrix[4 * row + column];
+    base_from_rig.translation[static_cast<int>(row)] = matrix[4 * row + 3];
+  }
+  return base_from_rig;
 }
 
 /// A camera of the scanner as the network sees it.
@@ -122,7 +137,16 @@ class Running : public Bridge {
                                                                                        : std::string());
     const std::lock_guard lock(mutex_);
     lost_ += cloud.lost;
-    const bool written = points_.write(point_cloud(cloud, {stamp, frame_id_}, calibrated_, options_.thinning));
+    const auto base_from_rig = base_from_rig_of(told);
+    // As if the cameras' places were in the frame of the points.
+    const auto placed = [&base_from_rig](CalibratedCamera camera) {
+      if (base_from_rig) camera.rig_from_camera = base_from_rig->after(camera.rig_from_camera);
+      return camera;
+    };
+    std::vector<CalibratedCamera> cameras;
+    std::transform(calibrated_.begin(), calibrated_.end(), std::back_inserter(cameras), placed);
+    const ros::Header of_points{stamp, base_from_rig ? options_.robot_base : frame_id_};
+    const bool written = points_.write(point_cloud(cloud, of_points, cameras, options_.thinning));
     ++(written ? published_ : lost_);
     if (!written && !std::exchange(overtaken_, true)) say(kOvertaken);
     std::uint8_t index = 0;
@@ -134,7 +158,7 @@ class Running : public Bridge {
       if (cloud.has("camera_u")) continue;  // a cloud of symbols has no depth image, so none is announced
       if (auto shown = show_depth(camera); !shown) say(to_string(shown.error()));
       if (!camera.depth.has_readers()) continue;
-      camera.depth.write(depth_image(cloud, header, *camera.calibrated, i, options_.thinning.stride));
+      camera.depth.write(depth_image(cloud, header, placed(*camera.calibrated), i, options_.thinning.stride));
       camera.depth_info.write(camera_info(*camera.calibrated, header, options_.thinning.stride));
     }
   }
@@ -152,6 +176,7 @@ class Running : public Bridge {
     try {
       client::ScanOptions options;
       options.density = options_.density;
+      if (on_arm_) options.coordinate_frame = "rig";  // the robot's pose is unknown here
       const client::Cloud cloud = client::Scanner(options_.socket).scan(options);
       publish(cloud);
       const std::string why = cloud.why_empty.empty() ? "" : ": " + cloud.why_empty;
@@ -169,6 +194,7 @@ class Running : public Bridge {
       client::Scanner scanner(options_.socket);
       const json status = json::parse(scanner.status());
       const json settings = json::parse(scanner.settings());
+      on_arm_ = settings.value("hand_eye", json::object()).value("mounted", "") == "arm";
       if (settings.value("calibration", "") != calibration_text_ || cameras_.empty()) {
         const std::lock_guard lock(mutex_);
         if (auto read = take_calibration(settings); !read)
@@ -298,6 +324,7 @@ class Running : public Bridge {
   std::string calibration_text_, calibration_date_, said_;
   bool stale_ = false;
   bool overtaken_ = false;  ///< a cloud was not published
+  std::atomic<bool> on_arm_{false};
   std::atomic<std::uint64_t> published_{0}, lost_{0};
   std::jthread clouds_, triggers_, state_;
 };

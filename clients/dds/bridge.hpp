@@ -13,14 +13,15 @@
 namespace slsd::dds {
 
 struct BridgeOptions {
-  std::string name = "scanner";      ///< the scanner's name in the network; its topics begin with it
-  std::string socket;                ///< the service's socket; empty: the usual place
-  std::optional<double> rate_hz;     ///< of clouds; 0: only triggered ones; nothing: every frame
-  std::string density;               ///< "symbols" or "pixels"; empty: as configured
-  Thinning thinning;                 ///< reduces clouds and depth images
-  double image_rate_hz = 0;          ///< of images from every camera; 0: none
-  bool transforms = true;            ///< false: the robot's own description contains the scanner's frames
-  std::filesystem::path extrinsics;  ///< file with the scanner's position; empty: unknown
+  std::string name = "scanner";          ///< the scanner's name in the network; its topics begin with it
+  std::string socket;                    ///< the service's socket; empty: the usual place
+  std::optional<double> rate_hz;         ///< of clouds; 0: only triggered ones; nothing: every frame
+  std::string density;                   ///< "symbols" or "pixels"; empty: as configured
+  Thinning thinning;                     ///< reduces clouds and depth images
+  double image_rate_hz = 0;              ///< of images from every camera; 0: none
+  bool transforms = true;                ///< false: the robot's own description contains the scanner's frames
+  std::string robot_base = "base_link";  ///< frame of clouds that the service places in the robot's base
+  std::filesystem::path extrinsics;      ///< file with the scanner's position; empty: unknown
 };
 
 /// The robot description (URDF) of a scanner, from that calibration file; if empty, from the service's calibration.

@@ -75,6 +75,7 @@ int main(int argc, char** argv) {
       ->check(slsd::between(0.0, 1000.0));
   app.add_option("--image-rate", options.image_rate_hz, "images per second, 1 or more; 0: none (0)")
       ->check(slsd::between(0.0, 100.0));
+  app.add_option("--robot-base", options.robot_base, "the frame of clouds in the robot's base")->type_name("FRAME");
   app.add_option("--extrinsics", options.extrinsics, "the TOML file with the poses of the scanners");
   app.add_flag_callback(
       "--no-transforms", [&options] { options.transforms = false; },

@@ -76,7 +76,7 @@ Result<LiveClouds> LiveClouds::open(const path& socket, const std::optional<path
 }
 
 Result<> LiveClouds::request() {
-  return connection_.request("scan", {{"format", "ply"}, {"density", "pixels"}});
+  return connection_.request("scan", {{"format", "ply"}, {"density", "pixels"}, {"coordinate_frame", "rig"}});
 }
 
 Result<std::optional<std::string>> LiveClouds::receive() {

@@ -31,6 +31,9 @@ struct ClientOptions {
   std::filesystem::path image;              ///< preview, frame, pattern: the PNG to write
   std::filesystem::path shown;              ///< project: a picture's name, or a file
   std::string density;                      ///< scan, watch: "symbols" or "pixels"; empty: as configured
+  std::string coordinate_frame;             ///< scan: "rig" or "robot_base"; empty: as configured
+  std::vector<double> robot_pose;           ///< scan: the robot's numbers; empty: none
+  std::string pose_notation;                ///< scan: how the robot writes them
   bool normals = false;                     ///< scan: normals of pixels
   bool mesh = false;                        ///< scan: triangles of pixels
   bool texture = false;                     ///< scan: intensities from a frame in white light

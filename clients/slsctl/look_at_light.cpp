@@ -60,7 +60,7 @@ int number_of(const json& settings, const std::string& name) {
 }
 
 std::optional<PatternPitch> scan_pitch(Connection& connection, const json& settings, const ClientOptions& options) {
-  json params{{"format", "ply"}, {"density", "symbols"}};
+  json params{{"format", "ply"}, {"density", "symbols"}, {"coordinate_frame", "rig"}};
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
   const auto answered = ask(connection, "scan", params);
   if (!answered) return std::nullopt;

@@ -75,7 +75,7 @@ class Recorder {
   [[nodiscard]] static Failure file_failure(const Error& error) { return {kRequestFailed, rpc_error(error)}; }
 
   [[nodiscard]] std::optional<Failure> ask_for_scan() {
-    json params{{"format", "ply"}, {"frames", "raw"}};
+    json params{{"format", "ply"}, {"frames", "raw"}, {"coordinate_frame", "rig"}};  // as its replay
     if (options_.timeout_ms) params["timeout_ms"] = *options_.timeout_ms;
     if (auto sent = connection_.request("scan", params); !sent) return failure(sent.error());
     return std::nullopt;

@@ -6,6 +6,7 @@
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/progress.hpp"
 #include "clients/slsctl/report.hpp"
+#include "core/cloud/coordinate_frame.hpp"
 #include "core/cloud/dense_file.hpp"
 #include "core/cloud/pcd.hpp"
 #include "core/cloud/ply.hpp"
@@ -62,7 +63,11 @@ std::string asked_format(const ClientOptions& options, bool dense) {
 Result<std::string> mesh_of(const ClientOptions& options, const json& result, std::string_view bytes) {
   const auto pixels = pixels_of(result, bytes, options.normals);
   if (!pixels) return tl::unexpected(pixels.error());
-  auto mesh = write_mesh(mesh_grid(pixels->grid(), kDepthJump), *mesh_format(cloud_format(options)),
+  Mesh surface = mesh_grid(pixels->grid(), kDepthJump);
+  if (const auto& base_from_rig = pixels->base_from_rig()) {
+    for (Eigen::Vector3f& vertex : surface.vertices_mm) vertex = (*base_from_rig * vertex.cast<double>()).cast<float>();
+  }
+  auto mesh = write_mesh(surface, *mesh_format(cloud_format(options)),
                          "scan " + result.value("scan", "") + ", " + result.value("time", ""));
   if (!mesh && mesh.error().code == ErrorCode::kNotFound)
     mesh.error().message += ": slsctl scan --picture FILE.png --why shows what was rejected";
@@ -85,7 +90,8 @@ tl::expected<void, Failure> write_cloud(const ClientOptions& options, const json
   }
   const auto cloud = read_ply(bytes, "the service's cloud");
   if (!cloud) return tl::unexpected(failure(cloud.error()));
-  return write_output(options.output, write_pcd(*cloud));
+  const auto base_from_rig = base_from_rig_of(bytes.substr(0, bytes.find("element vertex")));
+  return write_output(options.output, write_pcd(*cloud, base_from_rig ? &*base_from_rig : nullptr));
 }
 
 tl::expected<void, Failure> write_files(const ClientOptions& options, const Answered& answered) {
@@ -123,6 +129,8 @@ json scan_parameters(const ClientOptions& options, const std::string& density) {
   if (!density.empty()) params["density"] = density;
   if (!options.camera.empty()) params["camera"] = options.camera;
   if (!options.preset.empty()) params["preset"] = options.preset;
+  if (!options.coordinate_frame.empty()) params["coordinate_frame"] = options.coordinate_frame;
+  if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose, params["poses"] = options.pose_notation;
   if (options.normals) params["normals"] = true;
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;

@@ -11,6 +11,7 @@
 #include "clients/slsctl/output.hpp"
 #include "clients/usage/hand_eye_usage.hpp"
 #include "clients/usage/usage.hpp"
+#include "core/geometry/robot_pose.hpp"
 #include "core/shown_picture.hpp"
 #include "drivers/files/file.hpp"
 
@@ -60,6 +61,7 @@ void add_scan(CLI::App& app, ClientOptions& options) {
                                "  slsctl scan cloud.ply\n"
                                "  slsctl scan --density pixels depth.tiff\n"
                                "  slsctl scan part.stl\n"
+                               "  slsctl scan cloud.ply --poses ur --robot-pose=0.41,-0.23,0.61,2.9,0.12,0.04\n"
                                "  slsctl scan --format pcd -o - | my-program\n");
   CLI::Option* output =
       scan->add_option("-o,--output,CLOUD", options.output,
@@ -71,6 +73,18 @@ void add_scan(CLI::App& app, ClientOptions& options) {
   add_density(scan, options);
   scan->add_option("--preset", options.preset, "scan with the settings of this preset, which stay in force")
       ->type_name("NAME");
+  scan->add_option("--coordinate-frame", options.coordinate_frame, "the frame of the points (as configured)")
+      ->check(one_of({"rig", "robot_base"}));
+  CLI::Option* notation =
+      scan->add_option("--poses", options.pose_notation, "how the robot writes its pose; slsctl(1) explains each")
+          ->check(one_of(slsd::pose_notation_names()));
+  CLI::Option* pose =
+      scan->add_option("--robot-pose", options.robot_pose, "the robot's pose, if the scanner is on its arm")
+          ->expected(6, 16)
+          ->delimiter(',')
+          ->type_name("N,N,...")
+          ->needs(notation);
+  notation->needs(pose);
   scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
   scan->add_flag("--mesh", options.mesh, "join the points (of pixels) to triangles; .stl, .obj and .glb always do");
   scan->add_flag("--texture", options.texture, "also take a frame in white light, for the points' intensities");

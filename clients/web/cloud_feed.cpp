@@ -60,9 +60,12 @@ Failure CloudFeed::follow(const std::stop_token& stop) {
   auto connection = Connection::open(socket_);
   if (!connection) return failure(connection.error());
   connection->set_timeout(kTimeout);
-  const auto subscribed =
-      ask(*connection, "subscribe",
-          {{"format", "ply"}, {"density", density_}, {"rate_hz", rate_hz_}, {"transport", "memfd"}});
+  const auto subscribed = ask(*connection, "subscribe",
+                              {{"format", "ply"},
+                               {"density", density_},
+                               {"coordinate_frame", "rig"},
+                               {"rate_hz", rate_hz_},
+                               {"transport", "memfd"}});
   if (!subscribed) return subscribed.error();
   for (;;) {
     auto event = connection->receive();

@@ -327,7 +327,7 @@ Answer PageServer::cloud(const Request& request) {
 }
 
 Answer PageServer::scan(const json& body) {
-  json params{{"format", "ply"}, {"timeout_ms", 60'000}, {"transport", "memfd"}};
+  json params{{"format", "ply"}, {"coordinate_frame", "rig"}, {"timeout_ms", 60'000}, {"transport", "memfd"}};
   for (const auto& [key, value] : body.items()) {
     const bool known = key == "density" || key == "texture" || key == "ambient" || key == "normals";
     if (!known) return refusal(400, "invalid_params", "no such parameter: \"" + printable(key, 64) + "\"");

@@ -7,14 +7,13 @@
 #include <cmath>
 #include <cstring>
 
+#include "core/cloud/coordinate_frame.hpp"
 #include "core/cloud/point_record.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr std::string_view kUnitsLine = "units mm\n",
-                           kFrameLine = "coordinate_frame rig: the first camera's, x right, y down, z forward\n",
-                           kDataBegins = "\nDATA binary\n";
+constexpr std::string_view kUnitsLine = "units mm\n", kDataBegins = "\nDATA binary\n";
 constexpr std::size_t kDepthAt = 8, kSigmaAt = 12, kIntensityAt = 16, kCameraAt = 20;  // in a PCD's record
 
 float float_at(std::string_view record, std::size_t at) {
@@ -32,6 +31,10 @@ std::uint8_t intensity_of(std::string_view record) {
   return static_cast<std::uint8_t>(level > 0 ? std::min(level, 255.F) : 0);
 }
 
+const RigidTransform* frame_of(const DenseFacts& facts) {
+  return facts.base_from_rig ? &*facts.base_from_rig : nullptr;
+}
+
 /// The facts in both formats: a comment for each, after the format's mark.
 std::string comments(std::string_view mark, const DenseFacts& facts) {
   std::string lines;
@@ -39,8 +42,8 @@ std::string comments(std::string_view mark, const DenseFacts& facts) {
   add("scan_id " + header_text(facts.scan_id) + "\n");
   add("time " + header_text(facts.time) + "\n");
   add("frame " + std::to_string(facts.frame) + "\n");
-  add(kUnitsLine), add(kFrameLine);
-  return lines;
+  add(kUnitsLine);
+  return lines + frame_lines(mark, frame_of(facts));
 }
 
 int number_after(std::string_view header, std::string_view key) {
@@ -67,8 +70,9 @@ std::string dense_pcd_header(const DenseFacts& facts, int width, int height) {
                       "TYPE F F F F F U F F F\nCOUNT 1 1 1 1 1 1 1 1 1\n"
                     : "FIELDS x y z sigma_mm intensity camera\nSIZE 4 4 4 4 4 1\nTYPE F F F F F U\nCOUNT 1 1 1 1 1 1\n";
   return "# .PCD v0.7 - Point Cloud Data file format\n" + comments("# ", facts) + "VERSION 0.7\n" + fields + "WIDTH " +
-         std::to_string(width) + "\nHEIGHT " + std::to_string(height) + "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " +
-         std::to_string(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) + std::string(kDataBegins);
+         std::to_string(width) + "\nHEIGHT " + std::to_string(height) + "\n" + viewpoint_line(frame_of(facts)) +
+         "POINTS " + std::to_string(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) +
+         std::string(kDataBegins);
 }
 
 Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals) {
@@ -76,7 +80,8 @@ Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals
   const int width = end == std::string_view::npos ? 0 : number_after(bytes.substr(0, end), "\nWIDTH ");
   if (width <= 0 || height <= 0)
     return fail(ErrorCode::kMalformed, "the cloud is no organised PCD: its header has no size");
-  const DensePcd cloud(bytes.substr(end + kDataBegins.size()), width, height, normals);
+  DensePcd cloud(bytes.substr(end + kDataBegins.size()), width, height, normals);
+  cloud.base_from_rig_ = base_from_rig_of(bytes.substr(0, end));
   if (cloud.records_.size() / cloud.record_bytes() < cloud.pixels())
     return fail(ErrorCode::kMalformed, "the cloud has fewer points than its header says");
   return cloud;
@@ -94,10 +99,18 @@ std::string_view DensePcd::record(std::size_t pixel) const {
   return records_.substr(pixel * record_bytes(), record_bytes());
 }
 
+Eigen::Vector3f DensePcd::in_rig(std::string_view record) const {
+  Eigen::Vector3f place;
+  std::memcpy(place.data(), record.data(), 3 * sizeof(float));
+  if (!base_from_rig_) return place;
+  return (base_from_rig_->inverse() * place.cast<double>()).cast<float>();
+}
+
 std::string DensePcd::to_ply(const DenseFacts& facts) const {
   std::string points;
   std::size_t count = 0;
   DenseFacts all = facts;
+  all.base_from_rig = base_from_rig_;
   for (std::size_t pixel = 0; pixel < pixels(); ++pixel) {
     const std::string_view from = record(pixel);
     all.cameras = std::max(all.cameras, std::size_t{static_cast<std::uint8_t>(from[kCameraAt])} + 1);
@@ -117,7 +130,7 @@ PointGrid DensePcd::grid() const {
   grid.intensity.resize(pixels()), grid.camera.resize(pixels());
   for (std::size_t pixel = 0; pixel < pixels(); ++pixel) {
     const std::string_view from = record(pixel);
-    std::memcpy(grid.points_mm[pixel].data(), from.data(), 3 * sizeof(float));
+    grid.points_mm[pixel] = in_rig(from);
     grid.sigma_mm[pixel] = float_at(from, kSigmaAt);
     grid.intensity[pixel] = intensity_of(from);
     grid.camera[pixel] = static_cast<std::uint8_t>(from[kCameraAt]);
@@ -132,9 +145,10 @@ Cloud DensePcd::lattice(int step) const {
   for (int y = 0; y < height_; y += step) {
     for (int x = 0; x < width_; x += step) {
       const std::string_view from = record(static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + x);
-      if (!(float_at(from, kDepthAt) > 0)) continue;
+      const Eigen::Vector3f place = in_rig(from);
+      if (!(place.z() > 0)) continue;
       CloudPoint& point = cloud.points.emplace_back();
-      point.x = float_at(from, 0), point.y = float_at(from, 4), point.z = float_at(from, kDepthAt);
+      point.x = place.x(), point.y = place.y(), point.z = place.z();
       point.column = static_cast<std::uint16_t>(x / step), point.row = static_cast<std::uint16_t>(y / step);
       point.intensity = intensity_of(from);
     }

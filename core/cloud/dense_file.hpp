@@ -4,11 +4,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "core/cloud/cloud.hpp"
 #include "core/cloud/point_grid.hpp"
+#include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
@@ -27,6 +29,7 @@ struct DenseFacts {
   std::uint64_t frame = 0;  ///< sequence number of the first camera's frame
   std::size_t cameras = 1;
   bool normals = false;
+  std::optional<RigidTransform> base_from_rig = {};  ///< the points are in the robot's base; empty: in the rig's frame
 };
 
 /// @param points  number of records that follow
@@ -42,12 +45,14 @@ class DensePcd {
   /// @errors kMalformed: no such header, or too few records
   [[nodiscard]] static Result<DensePcd> open(std::string_view bytes, int height, bool normals);
 
-  /// Converts to a PLY, without the pixels that are not measured. Counts the cameras itself.
+  /// base_from_rig of the file; empty: its points are in the rig's frame.
+  [[nodiscard]] const std::optional<RigidTransform>& base_from_rig() const { return base_from_rig_; }
+  /// Converts to a PLY in the same frame, without the pixels that are not measured. Counts the cameras itself.
   [[nodiscard]] std::string to_ply(const DenseFacts& facts) const;
-  /// All pixels, measured or not.
+  /// All pixels, measured or not, in the rig's frame.
   [[nodiscard]] PointGrid grid() const;
   /// Every step-th pixel of every step-th row as a point whose column and row are its place in that lattice, as far as
-  /// it lies in front of the first camera.
+  /// it lies in front of the first camera. In the rig's frame.
   [[nodiscard]] Cloud lattice(int step) const;
 
  private:
@@ -56,10 +61,12 @@ class DensePcd {
   [[nodiscard]] std::size_t record_bytes() const;
   [[nodiscard]] std::size_t pixels() const;
   [[nodiscard]] std::string_view record(std::size_t pixel) const;
+  [[nodiscard]] Eigen::Vector3f in_rig(std::string_view record) const;
 
   std::string_view records_;
   int width_, height_;
   bool normals_;
+  std::optional<RigidTransform> base_from_rig_;
 };
 
 }  // namespace slsd

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/cloud/coordinate_frame.hpp"
 #include "core/cloud/point_record.hpp"
 
 namespace slsd {
@@ -17,19 +18,19 @@ std::string line_of_fields(std::string_view key, Value value) {
   return line + "\n";
 }
 
-std::string header(const Cloud& cloud) {
+std::string header(const Cloud& cloud, const RigidTransform* base_from_rig) {
   const std::string width = std::to_string(cloud.lattice_columns);
   const std::string height = std::to_string(cloud.lattice_rows * cloud.cameras);
   const std::string points = std::to_string(cloud.lattice_columns * cloud.lattice_rows * cloud.cameras);
   return "# .PCD v0.7 - Point Cloud Data file format\n# scan_id " + header_text(cloud.scan_id) + "\n# time " +
          header_text(cloud.time) + "\n# frame " + std::to_string(cloud.frame) +
          (cloud.sigma_calibration_mm ? "\n# sigma_calibration_mm " + sigma_calibration_text(cloud) : "") +
-         "\n# units mm, px\n# coordinate_frame rig: the first camera's, x right, y down, z forward\nVERSION 0.7\n" +
+         "\n# units mm, px\n" + frame_lines("# ", base_from_rig) + "VERSION 0.7\n" +
          line_of_fields("FIELDS", [](const PointField& field) { return std::string(field.name); }) +
          line_of_fields("SIZE", [](const PointField& field) { return std::to_string(field.pcd_bytes); }) +
          line_of_fields("TYPE", [](const PointField& field) { return std::string(1, field.pcd_type); }) +
          line_of_fields("COUNT", [](const PointField&) { return std::string("1"); }) + "WIDTH " + width + "\nHEIGHT " +
-         height + "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + points + "\nDATA binary\n";
+         height + "\n" + viewpoint_line(base_from_rig) + "POINTS " + points + "\nDATA binary\n";
 }
 
 CloudPoint no_point(int camera, int row, int column) {
@@ -63,11 +64,12 @@ std::vector<CloudPoint> organised(const Cloud& cloud) {
 
 }  // namespace
 
-std::string write_pcd(const Cloud& cloud) {
-  std::string bytes = header(cloud);
+std::string write_pcd(const Cloud& cloud, const RigidTransform* base_from_rig) {
+  std::string bytes = header(cloud, base_from_rig);
   const std::vector<CloudPoint> cells = organised(cloud);
   bytes.reserve(bytes.size() + cells.size() * kPcdPointBytes);
-  for (const CloudPoint& cell : cells) append_pcd_point(cell, bytes);
+  for (const CloudPoint& cell : cells)
+    append_pcd_point(base_from_rig == nullptr ? cell : moved(cell, *base_from_rig), bytes);
   return bytes;
 }
 

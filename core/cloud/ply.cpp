@@ -8,14 +8,14 @@
 #include <cstdint>
 #include <limits>
 
+#include "core/cloud/coordinate_frame.hpp"
 #include "core/cloud/point_record.hpp"
 
 namespace slsd {
 namespace {
 
 constexpr std::string_view kBegin = "ply\nformat binary_little_endian 1.0\n";
-constexpr std::string_view kUnits =
-    "comment units mm, px\ncomment coordinate_frame rig: the first camera's, x right, y down, z forward\n";
+constexpr std::string_view kUnits = "comment units mm, px\n";
 
 std::string property_lines() {
   std::string lines;
@@ -56,6 +56,12 @@ class HeaderReader {
     if (error != std::errc() || end != digits.data() + digits.size() || !std::isfinite(value) || value < 0) refuse(key);
     return value;
   }
+  // base_from_rig; nothing in the rig's frame.
+  std::optional<RigidTransform> frame() {
+    auto base_from_rig = base_from_rig_of(rest_.substr(0, rest_.find("element vertex")));
+    expect(frame_lines("comment ", base_from_rig ? &*base_from_rig : nullptr));
+    return base_from_rig;
+  }
   [[nodiscard]] const std::string& problem() const { return problem_; }
   [[nodiscard]] std::string_view rest() const { return rest_; }
 
@@ -69,12 +75,13 @@ class HeaderReader {
 
 }  // namespace
 
-std::string write_ply(const Cloud& cloud) {
+std::string write_ply(const Cloud& cloud, const RigidTransform* base_from_rig) {
   std::string bytes(kBegin);
   bytes += "comment scan_id " + header_text(cloud.scan_id) + "\n";
   bytes += "comment time " + header_text(cloud.time) + "\n";
   bytes += "comment frame " + std::to_string(cloud.frame) + "\n";
   bytes += kUnits;
+  bytes += frame_lines("comment ", base_from_rig);
   if (cloud.sigma_calibration_mm) bytes += "comment sigma_calibration_mm " + sigma_calibration_text(cloud) + "\n";
   bytes += "comment lattice_columns " + std::to_string(cloud.lattice_columns) + "\n";
   bytes += "comment lattice_rows " + std::to_string(cloud.lattice_rows) + "\n";
@@ -82,7 +89,8 @@ std::string write_ply(const Cloud& cloud) {
   bytes += "element vertex " + std::to_string(cloud.points.size()) + "\n";
   bytes += property_lines();
   bytes.reserve(bytes.size() + cloud.points.size() * kPointBytes);
-  for (const CloudPoint& point : cloud.points) append_point(point, bytes);
+  for (const CloudPoint& point : cloud.points)
+    append_point(base_from_rig == nullptr ? point : moved(point, *base_from_rig), bytes);
   return bytes;
 }
 
@@ -95,6 +103,7 @@ Result<Cloud> read_ply(std::string_view bytes, std::string_view name) {
   cloud.time = header.text("comment time ");
   cloud.frame = header.number("comment frame ", std::numeric_limits<std::uint64_t>::max());
   header.expect(kUnits);
+  const auto base_from_rig = header.frame();
   if (header.has("comment sigma_calibration_mm "))
     cloud.sigma_calibration_mm = header.length("comment sigma_calibration_mm ");
   cloud.lattice_columns = static_cast<int>(header.number("comment lattice_columns ", kMaxLattice));
@@ -113,7 +122,7 @@ Result<Cloud> read_ply(std::string_view bytes, std::string_view name) {
   for (std::uint64_t i = 0; i < count; ++i) {
     const auto point = read_point(header.rest().data() + i * kPointBytes);
     if (!point) return fail(ErrorCode::kMalformed, "has no valid cell in point " + std::to_string(i), where);
-    cloud.points.push_back(*point);
+    cloud.points.push_back(base_from_rig ? moved(*point, base_from_rig->inverse()) : *point);
   }
   return cloud;
 }

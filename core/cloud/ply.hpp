@@ -6,14 +6,16 @@
 #include <string_view>
 
 #include "core/cloud/cloud.hpp"
+#include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
 
 /// Writes binary little-endian PLY as in docs/formats.md.
-[[nodiscard]] std::string write_ply(const Cloud& cloud);
+/// @param base_from_rig  takes the points into the robot's base; null: they stay in the rig's frame
+[[nodiscard]] std::string write_ply(const Cloud& cloud, const RigidTransform* base_from_rig = nullptr);
 
-/// Reads the output of write_ply, and no other PLY.
+/// Reads the output of write_ply, and no other PLY. Takes points of the robot's base back into the rig's frame.
 /// @errors kMalformed
 [[nodiscard]] Result<Cloud> read_ply(std::string_view bytes, std::string_view name);
 

@@ -27,13 +27,13 @@ constexpr double kSaturated = 0.985;
 /// Largest change of white by print and shading that most pixels have within the window of a fit.
 constexpr double kWhiteOff = 0.3;
 
-/// The points of a view in the rig frame, pixel by pixel.
+/// The points of a view in the file's frame, pixel by pixel.
 class ViewPoints {
  public:
-  explicit ViewPoints(const DenseView& view)
+  ViewPoints(const DenseView& view, const RigidTransform& file_from_camera)
       : view_(view),
-        rotation_(view.rig_from_camera.rotation.cast<float>()),
-        translation_(view.rig_from_camera.translation.cast<float>()) {}
+        rotation_(file_from_camera.rotation.cast<float>()),
+        translation_(file_from_camera.translation.cast<float>()) {}
 
   [[nodiscard]] Eigen::Vector3f at(int x, int y) const {
     const float depth = view_.map.depth_mm[index(x, y)];
@@ -91,13 +91,14 @@ inline __attribute__((always_inline)) void place_lanes(const RowPiece& in, float
   }
 }
 
-/// Positions of the points of a view's row in the rig's frame, the same for every format.
+/// Positions of the points of a view's row in the file's frame, the same for every format.
 class RowPlaces {
  public:
   static_assert(RayGrid::kPitchPx == kLanes);  // rays between the stored ones lie on a line
 
-  explicit RowPlaces(const DenseView& view) : view_(view), rotation_(view.rig_from_camera.rotation.cast<float>()) {
-    Eigen::Map<Eigen::Vector3f>(piece_.translation) = view.rig_from_camera.translation.cast<float>();
+  RowPlaces(const DenseView& view, const RigidTransform& file_from_camera)
+      : view_(view), rotation_(file_from_camera.rotation.cast<float>()) {
+    Eigen::Map<Eigen::Vector3f>(piece_.translation) = file_from_camera.translation.cast<float>();
     for (auto& of_axis : places_) of_axis.resize(static_cast<std::size_t>(view.map.width) + kLanes);
   }
   void place(int y) {
@@ -138,8 +139,13 @@ void put_point(char*& to, const DenseView& view, const RowPlaces& row, const Vie
   if (normals) put(to, points.normal(x, y));
 }
 
-DenseFacts facts_of(const DenseCloud& cloud, bool normals) {
-  return {cloud.scan_id, cloud.time, cloud.frame, cloud.views.size(), normals};
+DenseFacts facts_of(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig) {
+  return {cloud.scan_id,      cloud.time, cloud.frame,
+          cloud.views.size(), normals,    base_from_rig ? std::optional(*base_from_rig) : std::nullopt};
+}
+
+RigidTransform file_from_camera(const DenseView& view, const RigidTransform* base_from_rig) {
+  return base_from_rig == nullptr ? view.rig_from_camera : base_from_rig->after(view.rig_from_camera);
 }
 
 std::size_t bytes_of_point(std::size_t record, bool normals) {
@@ -197,13 +203,14 @@ std::size_t shade_view(DenseView& view, const SceneLight& light) {
   return saturated;
 }
 
-std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
-  std::string bytes = dense_ply_header(facts_of(cloud, normals), cloud.points());
+std::string write_dense_ply(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig) {
+  std::string bytes = dense_ply_header(facts_of(cloud, normals, base_from_rig), cloud.points());
   bytes.reserve(bytes.size() + cloud.points() * bytes_of_point(kDensePlyBytes, normals));
   std::string row;
   for (const DenseView& view : cloud.views) {
-    const ViewPoints points(view);
-    RowPlaces places(view);
+    const RigidTransform place = file_from_camera(view, base_from_rig);
+    const ViewPoints points(view, place);
+    RowPlaces places(view, place);
     row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(kDensePlyBytes, normals));
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
@@ -217,17 +224,18 @@ std::string write_dense_ply(const DenseCloud& cloud, bool normals) {
   return bytes;
 }
 
-std::string write_dense_pcd(const DenseCloud& cloud, bool normals) {
+std::string write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig) {
   int width = 0, height = 0;
   for (const DenseView& view : cloud.views) width = std::max(width, view.map.width), height += view.map.height;
-  std::string bytes = dense_pcd_header(facts_of(cloud, normals), width, height);
+  std::string bytes = dense_pcd_header(facts_of(cloud, normals, base_from_rig), width, height);
   const std::size_t begin = bytes.size();
   bytes.resize(begin + static_cast<std::size_t>(width) * height * bytes_of_point(kDensePcdBytes, normals));
   char* to = bytes.data() + begin;
   const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
   for (const DenseView& view : cloud.views) {
-    const ViewPoints points(view);
-    RowPlaces places(view);
+    const RigidTransform place = file_from_camera(view, base_from_rig);
+    const ViewPoints points(view, place);
+    RowPlaces places(view, place);
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
       for (int x = 0; x < width; ++x) {

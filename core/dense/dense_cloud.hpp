@@ -42,13 +42,16 @@ struct DenseCloud {
 /// @return number of saturated pixels
 std::size_t shade_view(DenseView& view, const SceneLight& light);
 
-// Binary, little-endian; normals, which face the camera, add 12 bytes a point.
+// Binary, little-endian; normals, which face the camera, add 12 bytes a point. Points are in the robot's base with
+// base_from_rig, else in the rig's frame.
 
 /// The measured points, row by row and camera by camera: 18 bytes each.
-[[nodiscard]] std::string write_dense_ply(const DenseCloud& cloud, bool normals);
+[[nodiscard]] std::string write_dense_ply(const DenseCloud& cloud, bool normals,
+                                          const RigidTransform* base_from_rig = nullptr);
 /// Organised: a point for each pixel, NaN if not measured, with the cameras' images stacked vertically. 21 bytes each,
 /// as intensity is a float: PCL's PointXYZI accepts nothing else.
-[[nodiscard]] std::string write_dense_pcd(const DenseCloud& cloud, bool normals);
+[[nodiscard]] std::string write_dense_pcd(const DenseCloud& cloud, bool normals,
+                                          const RigidTransform* base_from_rig = nullptr);
 /// Two pages of floats for each camera: Z in its frame, mm, and sigma_mm.
 [[nodiscard]] std::string write_dense_tiff(const DenseCloud& cloud);
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "core/geometry/robot_pose.hpp"
 #include "core/hand_eye/hand_eye_model.hpp"
-#include "core/hand_eye/robot_pose.hpp"
 
 namespace slsd {
 

@@ -28,6 +28,8 @@ constexpr std::array kArrayMethods{std::pair("constructive"sv, ArrayMethod::kCon
 constexpr std::array kPrecisions{std::pair("standard"sv, Precision::kStandard), std::pair("fine"sv, Precision::kFine)};
 constexpr std::array kDensities{std::pair("symbols"sv, Density::kSymbols), std::pair("pixels"sv, Density::kPixels)};
 constexpr std::array kMethods{std::pair("default"sv, Method::kDefault), std::pair("paper"sv, Method::kPaper)};
+constexpr std::array kCoordinateFrames{std::pair("rig"sv, CoordinateFrame::kRig),
+                                       std::pair("robot_base"sv, CoordinateFrame::kRobotBase)};
 constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
                                     std::pair("warn"sv, OtherHardware::kWarn)};
 
@@ -72,6 +74,11 @@ void read_keys(TableReader& reader, DecodeOptions& options) {
   reader.choose("link_grid", options.link_grid, kMethods);
   reader.choose("decode_windows", options.decode_windows, kMethods);
   reader.choose("correspond", options.correspond, kMethods);
+}
+
+void read_keys(TableReader& reader, FrameOptions& options) {
+  reader.choose("output", options.output, kCoordinateFrames);
+  reader.read("hand_eye", options.hand_eye);
 }
 
 void read_keys(TableReader& reader, ScanOptions& options) {
@@ -162,7 +169,7 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   TableReader top(&document, "", file);
   const auto table = [&](const std::string& name) { return TableReader(top.table(name), "[" + name + "]", file); };
   const TableReader projector = table("projector"), pattern = table("pattern"), calibration = table("calibration"),
-                    decode = table("decode"), scan = table("scan"), server = table("server"),
+                    decode = table("decode"), frame = table("frame"), scan = table("scan"), server = table("server"),
                     black_box = table("black_box");
   const std::vector<const toml::table*> cameras = top.tables("camera");
   Configuration configuration;
@@ -176,6 +183,7 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   }
   if (read) read = read_calibration_table(calibration, configuration);
   if (read) read = read_table(decode, configuration.decode);
+  if (read) read = read_table(frame, configuration.frame);
   if (read) read = read_table(scan, configuration.scan);
   if (read) read = read_table(server, configuration.server);
   if (read) read = read_table(black_box, configuration.black_box);
@@ -206,6 +214,7 @@ std::vector<std::string> known_keys() {
   add("projector", [&](auto& reader) { read_keys(reader, ignored.projector); });
   add("calibration", [&](auto& reader) { read_calibration_keys(reader, ignored); });
   add("decode", [&](auto& reader) { read_keys(reader, ignored.decode); });
+  add("frame", [&](auto& reader) { read_keys(reader, ignored.frame); });
   add("scan", [&](auto& reader) { read_keys(reader, ignored.scan); });
   add("server", [&](auto& reader) { read_keys(reader, ignored.server); });
   add("black_box", [&](auto& reader) { read_keys(reader, ignored.black_box); });

@@ -15,6 +15,7 @@
 #include "core/result.hpp"
 #include "daemon/configuration/black_box_options.hpp"
 #include "daemon/configuration/camera_options.hpp"
+#include "daemon/configuration/frame_options.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
 #include "daemon/configuration/server_options.hpp"
@@ -35,6 +36,7 @@ struct Configuration {
   std::filesystem::path calibration_file;  ///< empty: none, and no scan is possible
   OtherHardware other_hardware = OtherHardware::kError;
   DecodeOptions decode;
+  FrameOptions frame;
   ScanOptions scan;
   ServerOptions server;
   BlackBoxOptions black_box;

@@ -10,6 +10,7 @@
 #include "daemon/configuration/access.hpp"
 #include "daemon/configuration/black_box_options.hpp"
 #include "daemon/configuration/camera_options.hpp"
+#include "daemon/configuration/frame_options.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
 #include "daemon/configuration/server_options.hpp"
@@ -107,6 +108,12 @@ Result<> ProjectorOptions::validate() const {
   if (auto valid = in_range("idle_after_ms", idle_after_ms, 0, 3'600'000); !valid) return valid;
   if (refresh_hz == 0 || (refresh_hz >= 10 && refresh_hz <= 1000)) return {};
   return fail(ErrorCode::kInvalidArgument, "refresh_hz must be 10 to 1000, or 0 for a projector with steady light");
+}
+
+Result<> FrameOptions::validate() const {
+  if (output == CoordinateFrame::kRig || !hand_eye.empty()) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              "output = \"robot_base\" needs hand_eye, the file that slsctl hand-eye writes: set it in this table");
 }
 
 Result<> ScanOptions::validate() const {

@@ -53,6 +53,18 @@ std::optional<double> ParamReader::number(const char* name, double low, double h
   return std::nullopt;
 }
 
+std::vector<double> ParamReader::numbers(const char* name, std::size_t count_max) {
+  const auto* value = find(name);
+  if (value == nullptr) return {};
+  const auto is_finite = [](const nlohmann::json& each) {
+    return each.is_number() && std::isfinite(each.get<double>());
+  };
+  if (value->is_array() && !value->empty() && value->size() <= count_max && std::ranges::all_of(*value, is_finite))
+    return value->get<std::vector<double>>();
+  refuse(name, "a list of 1 to " + std::to_string(count_max) + " finite numbers");
+  return {};
+}
+
 std::string ParamReader::text(const char* name, std::size_t bytes_max) {
   const auto* value = find(name);
   if (value == nullptr) return {};

@@ -30,6 +30,8 @@ class ParamReader {
   [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
   /// A text of at most this many bytes. It may contain control characters: use printable() before quoting it.
   [[nodiscard]] std::string text(const char* name, std::size_t bytes_max = kMaxTextBytes);
+  /// A list of at most this many finite numbers; empty if missing.
+  [[nodiscard]] std::vector<double> numbers(const char* name, std::size_t count_max);
   /// One of the words; the first if missing.
   [[nodiscard]] std::string choice(const char* name, std::initializer_list<std::string_view> words);
 

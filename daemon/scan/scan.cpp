@@ -83,7 +83,8 @@ void Scan::compute(std::size_t lane) {
   if (set_) set_->give_back();  // back to the driver before other jobs have their turn
   if (!result_ || !in_time) return;
   result_->lost = std::move(lost_);
-  result_->files = CloudFiles(result_->cloud, result_->dense.get(), request_.formats);
+  result_->files = CloudFiles(result_->cloud, result_->dense.get(), request_.formats,
+                              setup_->base_from_rig(request_.base_from_flange));
 }
 
 FrameTask::FrameTask(FrameRequest request, Answer answer)

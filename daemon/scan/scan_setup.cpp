@@ -121,6 +121,16 @@ Result<std::optional<Calibration>> configured_calibration(const Configuration& c
   return std::optional(std::move(*calibration));
 }
 
+Result<std::optional<HandEyeCalibration>> configured_hand_eye(const Configuration& configuration) {
+  const auto& file = configuration.frame.hand_eye;
+  if (file.empty()) return std::nullopt;
+  const auto text = read_file(file, kMaxFileBytes);
+  if (!text) return tl::unexpected(text.error());
+  auto hand_eye = read_hand_eye(*text, file.string());
+  if (!hand_eye) return tl::unexpected(hand_eye.error());
+  return std::optional(std::move(*hand_eye));
+}
+
 double FullLevels::raise(std::size_t camera, double level) {
   const std::lock_guard lock(mutex_);
   if (greatest_.size() <= camera) greatest_.resize(camera + 1, 0);
@@ -173,7 +183,11 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::siz
   if (!pattern) return tl::unexpected(pattern.error());
   auto calibration = configured_calibration(configuration);
   if (!calibration) return tl::unexpected(calibration.error());
-  return of(std::move(*pattern), std::move(*calibration), configuration, lanes);
+  auto hand_eye = configured_hand_eye(configuration);
+  if (!hand_eye) return tl::unexpected(hand_eye.error());
+  auto setup = of(std::move(*pattern), std::move(*calibration), configuration, lanes);
+  if (setup) setup->hand_eye = std::move(*hand_eye);
+  return setup;
 }
 
 Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> calibration,
@@ -211,6 +225,24 @@ Result<> ScanSetup::check(const ScanRequest& request) const {
     return fail(ErrorCode::kNotFound, "no calibration: calibrate, or set [calibration] file in the configuration");
   }
   return check_camera(request.camera);
+}
+
+Result<> ScanSetup::check_robot_base() const {
+  if (!hand_eye) {
+    return fail(ErrorCode::kNotFound,
+                "the scanner's place in the robot's base is unknown: run slsctl hand-eye, and set [frame] hand_eye");
+  }
+  const std::string now = calibration ? calibration->report.date.value_or("") : "";
+  if (now.empty() || hand_eye->calibration_date.empty() || now == hand_eye->calibration_date) return {};
+  return fail(ErrorCode::kMismatch, "hand_eye was measured with the calibration of " + hand_eye->calibration_date +
+                                        ", but the one in force is of " + now + ": run slsctl hand-eye again");
+}
+
+std::optional<RigidTransform> ScanSetup::base_from_rig(const std::optional<RigidTransform>& base_from_flange) const {
+  if (!check_robot_base()) return std::nullopt;
+  if (hand_eye->mounted == Mounted::kCell) return hand_eye->mount_from_rig;
+  if (!base_from_flange) return std::nullopt;
+  return base_from_flange->after(hand_eye->mount_from_rig);
 }
 
 Result<> ScanSetup::check_camera(const std::string& name) const {

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/calibration_file/hand_eye_file.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/dense/dense_cloud.hpp"
@@ -32,6 +33,10 @@ namespace slsd {
 /// The calibration that the configuration names; empty if it names none.
 /// @errors of read_file() and read_calibration(); kMismatch: for another projector size, or without one of the cameras
 [[nodiscard]] Result<std::optional<Calibration>> configured_calibration(const Configuration& configuration);
+
+/// The hand-eye calibration that the configuration names; empty if it names none.
+/// @errors of read_file() and read_hand_eye()
+[[nodiscard]] Result<std::optional<HandEyeCalibration>> configured_hand_eye(const Configuration& configuration);
 
 /// The files that determine a scan's cloud together with its frames, as text that can be read again.
 struct ScanFiles {
@@ -96,6 +101,7 @@ struct ScanSetup {
   std::vector<std::string> doubts = {};                ///< doubts about the calibration, from calibration_doubts()
   double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< nearest depth of the scene along the cameras' axes
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
+  std::optional<HandEyeCalibration> hand_eye = {};
 
   /// @param lanes  number of decoding threads
   /// @errors of the two above; of Decoder::create()
@@ -107,6 +113,13 @@ struct ScanSetup {
 
   /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of this name
   [[nodiscard]] Result<> check(const ScanRequest& request) const;
+  /// Checks that clouds can be in the robot's base. @errors kNotFound: no hand-eye calibration; kMismatch: it was
+  /// measured with another calibration of the scanner
+  [[nodiscard]] Result<> check_robot_base() const;
+  /// The place of the rig in the robot's base; nothing if check_robot_base() fails, or the pose is needed but missing.
+  /// @param base_from_flange  the robot's pose; counts if the scanner is on its arm
+  [[nodiscard]] std::optional<RigidTransform> base_from_rig(
+      const std::optional<RigidTransform>& base_from_flange) const;
   /// @errors kNotFound: no camera of this name
   [[nodiscard]] Result<> check_camera(const std::string& name) const;
   /// @param name  of a camera; empty: the first

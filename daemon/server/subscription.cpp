@@ -52,6 +52,7 @@ std::optional<Outgoing> Subscription::take(Clock::time_point now) {
   const SharedBytes cloud = publication->cloud(form_);
   nlohmann::json params = scan_json(*publication->scan(), form_.density);
   params["format"] = to_string(form_.format);
+  add_frame(params, publication->base_from_rig(form_));
   if (as_memfd_) {
     auto memory = sealed_memory(*cloud);
     if (!memory) {

@@ -253,11 +253,14 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
   state_.configuration.calibration_file = configuration->calibration_file;
   state_.configuration.other_hardware = configuration->other_hardware;
   state_.configuration.decode = configuration->decode;
+  state_.configuration.frame = configuration->frame;
   state_.configuration.cameras = with_exposures_of(state_.configuration.cameras, configuration->cameras);
   state_.configuration.scan.timeout_ms = configuration->scan.timeout_ms;
   for (const char* table : {"pattern", "calibration", "decode"}) {
     state_.configuration.given[table] = configuration->given.value(table, nlohmann::json::object());
   }
+  state_.configuration.given.erase("frame");
+  if (configuration->given.contains("frame")) state_.configuration.given["frame"] = configuration->given["frame"];
   note_exposures(state_.configuration.given, configuration->given);
   // The next start reads this file; the configuration itself belongs to the administrator.
   const bool changed = settings != state_.settings;

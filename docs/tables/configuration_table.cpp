@@ -107,6 +107,17 @@ ConfigurationTable decode() {
         R"(How each stage works: "default", or "paper" as Elahi et al. 2020 describe it.)"}}};
 }
 
+ConfigurationTable frame() {
+  return {
+      "frame",
+      "The frame of a cloud's points, see docs/robot.md.",
+      {{{{"output", R"("rig")"}},
+        R"("rig": the first camera's. "robot_base": the robot's; with the scanner on the arm, each scan then needs the )"
+        "robot's pose. A request may choose another one."},
+       {{{"hand_eye", R"("")"}},
+        R"(The file that slsctl hand-eye wrote, hand_eye.yml. Empty: none, and only "rig" is possible.)"}}};
+}
+
 ConfigurationTable scan() {
   return {
       "scan",
@@ -168,7 +179,7 @@ ConfigurationTable black_box() {
 std::vector<ConfigurationTable> configuration_tables() {
   std::vector<ConfigurationTable> tables{pattern(), projector()};
   for (ConfigurationTable& table : camera_tables()) tables.push_back(std::move(table));
-  for (const auto make : {calibration, decode, scan, server, black_box}) tables.push_back(make());
+  for (const auto make : {calibration, decode, frame, scan, server, black_box}) tables.push_back(make());
   return tables;
 }
 

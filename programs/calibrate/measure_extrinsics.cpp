@@ -95,6 +95,7 @@ Result<CloudLook> look(Scanner& scanner, const Board& board) {
     client::ScanOptions options;
     options.timeout = kTimeout;
     options.density = "pixels";
+    options.coordinate_frame = "rig";
     options.texture = options.frames = true;
     cloud = scanner.service.scan(options);
     told = json::parse(cloud.description);

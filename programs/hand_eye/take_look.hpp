@@ -7,7 +7,7 @@
 #include <span>
 #include <string>
 
-#include "core/hand_eye/robot_pose.hpp"
+#include "core/geometry/robot_pose.hpp"
 #include "programs/calibrate/session/pose_source.hpp"
 
 namespace slsd {

@@ -27,6 +27,7 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 
 import numpy as np  # noqa: E402
 
+import robot_frame_test  # noqa: E402
 import slsd  # noqa: E402
 from dds_load import measure, take_domain  # noqa: E402
 from python_test import Impostor, ply, result  # noqa: E402
@@ -362,6 +363,36 @@ class Thinned(unittest.TestCase):
             wait_until(lambda: int(states.samples.get("left: slsd", {"values": {"clouds lost before publishing": "0"}})["values"]
                                    ["clouds lost before publishing"]) > 2, "that clouds are lost")
             self.assertEqual(bridge.said().count("clouds exceed the rate limit"), 1)
+
+
+class InTheRobotsBase(unittest.TestCase):
+    def shown(self, mounted, *more, **scan):
+        """A published cloud, and the scan of the socket, in the frame as configured."""
+        service = Service(configuration=robot_frame_test.CONFIGURATION.format(
+            scene=SCENE, frame='output = "robot_base"\nhand_eye = "hand_eye.yml"'))
+        (service.folder / "hand_eye.yml").write_text(robot_frame_test.hand_eye(mounted), encoding="utf-8")
+        with service, slsd.Scanner(service.socket) as scanner:
+            whole = scanner.scan(density="pixels", timeout_s=60, **scan)
+            with Bridge(service, "--rate", "2", "--density", "pixels", *more):
+                message = probe("left/points", "PointCloud2")[0].point_cloud()
+        return message["header"]["frame_id"], np.frombuffer(message["data"], RECORD), whole
+
+    def check(self, points, whole):
+        """Every second pixel of every second row is there, nothing else."""
+        self.assertAlmostEqual(len(points) / len(whole.points), 1 / 4, delta=0.01)
+        every = {tuple(point) for point in np.stack([whole.points[axis] / np.float32(1000) for axis in "xyz"], axis=1).tolist()}
+        self.assertTrue(every.issuperset(map(tuple, np.stack([points[axis] for axis in "xyz"], axis=1).tolist())))
+
+    def test_with_the_scanner_in_the_cell(self):
+        frame, points, whole = self.shown("cell", "--robot-base", "ur10_base")
+        self.assertEqual(frame, "ur10_base")
+        np.testing.assert_allclose(np.reshape(whole.description["base_from_rig"], (4, 4)), robot_frame_test.MOUNT, atol=1e-6)
+        self.check(points, whole)
+
+    def test_with_the_scanner_on_the_arm_clouds_stay_with_the_scanner(self):
+        frame, points, whole = self.shown("arm", coordinate_frame="rig")
+        self.assertEqual(frame, "left_optical_frame")
+        self.check(points, whole)
 
 
 class Empty(unittest.TestCase):

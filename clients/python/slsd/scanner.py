@@ -10,7 +10,7 @@ import secrets
 import time
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Callable, Generator, Literal, Mapping
+from typing import Any, Callable, Generator, Literal, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -79,7 +79,9 @@ class Scanner:
 
     def scan(self, *, timeout_s: float | None = 5.0, density: Density | None = None, normals: bool = False,
              texture: bool = False, ambient: bool = False, picture: bool = False, camera: str | None = None,
-             frames: bool = False, shared: bool = True, why: bool = False, preset: str | None = None) -> Cloud:
+             frames: bool = False, shared: bool = True, why: bool = False, preset: str | None = None,
+             coordinate_frame: Literal["rig", "robot_base"] | None = None, robot_pose: Sequence[float] | None = None,
+             poses: str | None = None) -> Cloud:
         """Takes one scan.
 
         density  "symbols": a point for each symbol of the pattern; "pixels": one for each camera pixel; None: as
@@ -95,10 +97,14 @@ class Scanner:
         why      lists the rules that rejected regions, with remedies, in `description["reasons"]`; the picture marks
                  each region by its rule
         preset   puts the settings of this preset into force, where they stay, and scans with them
+        coordinate_frame  the frame of the points; None: as configured
+        robot_pose  the pose of the robot whose arm carries the scanner, in its own numbers
+        poses    how the robot writes them: "ur", "kuka", "abb", ...
         """
         params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
-                         camera=camera, frames="raw" if frames else None, why=why)
+                         camera=camera, frames="raw" if frames else None, why=why, coordinate_frame=coordinate_frame,
+                         robot_pose=None if robot_pose is None else [float(each) for each in robot_pose], poses=poses)
         answer = self._call("scan", params, timeout_s)
         cloud = read_ply(_need(answer, "the cloud"), answer.result)
         for event, data in answer.events:

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -27,11 +28,13 @@ enum class CloudFormat : std::uint8_t { kPly, kPcd, kTiff };
   return density == Density::kPixels ? "pixels" : "symbols";
 }
 
-/// The form of a cloud that a client asks for. Only dense clouds have depth maps and normals.
+/// The form of a cloud that a client asks for. Only dense clouds have depth maps and normals. Depth maps are in their
+/// camera's frame.
 struct CloudForm {
   CloudFormat format = CloudFormat::kPly;
   Density density = Density::kSymbols;
   bool normals = false;
+  bool in_base = false;  ///< in the robot's base instead of the rig's frame
 
   CloudForm() = default;
   CloudForm(CloudFormat of_format, Density of_density = Density::kSymbols,  // NOLINT: a format is a form
@@ -39,9 +42,15 @@ struct CloudForm {
       : format(of_format), density(of_density), normals(with_normals) {}
   [[nodiscard]] bool dense() const { return density == Density::kPixels; }
 
-  static constexpr unsigned kCount = 12;
+  static constexpr unsigned kCount = 24;
   [[nodiscard]] unsigned index() const {
-    return static_cast<unsigned>(format) + (dense() ? 3U : 0U) + (normals ? 6U : 0U);
+    return static_cast<unsigned>(format) + (dense() ? 3U : 0U) + (normals ? 6U : 0U) + (in_base ? 12U : 0U);
+  }
+  [[nodiscard]] static CloudForm of_index(unsigned index) {
+    CloudForm form(static_cast<CloudFormat>(index % 3), index / 3 % 2 != 0 ? Density::kPixels : Density::kSymbols,
+                   index / 6 % 2 != 0);
+    form.in_base = index / 12 != 0;
+    return form;
   }
 };
 
@@ -50,20 +59,20 @@ class CloudFormats {
  public:
   [[nodiscard]] static CloudFormats only(CloudForm form) {
     CloudFormats formats;
-    formats.bits_ = static_cast<std::uint16_t>(1U << form.index());
+    formats.bits_ = 1U << form.index();
     return formats;
   }
   [[nodiscard]] bool has(CloudForm form) const { return (bits_ >> form.index() & 1U) != 0; }
   /// Tells whether a form needs a point for each pixel.
-  [[nodiscard]] bool dense() const { return (bits_ & 0b111000'111000U) != 0; }
+  [[nodiscard]] bool dense() const { return (bits_ & 0b111000'111000'111000'111000U) != 0; }
   friend CloudFormats operator|(CloudFormats a, CloudFormats b) {
-    a.bits_ = static_cast<std::uint16_t>(a.bits_ | b.bits_);
+    a.bits_ |= b.bits_;
     return a;
   }
   friend bool operator==(CloudFormats, CloudFormats) = default;
 
  private:
-  std::uint16_t bits_ = 0;  // by CloudForm::index()
+  std::uint32_t bits_ = 0;  // by CloudForm::index()
 };
 
 /// Bytes that several clients may send, each at its own pace; hence shared.
@@ -74,14 +83,20 @@ using SharedBytes = std::shared_ptr<const std::string>;
 class CloudFiles {
  public:
   CloudFiles() = default;
-  /// @param dense  null if no form needs it
-  CloudFiles(const Cloud& cloud, const DenseCloud* dense, CloudFormats formats) {
-    for (const CloudFormat format : {CloudFormat::kPly, CloudFormat::kPcd, CloudFormat::kTiff}) {
-      for (const CloudForm form :
-           {CloudForm(format), CloudForm(format, Density::kPixels), CloudForm(format, Density::kPixels, true)}) {
-        if (formats.has(form)) (void)file(cloud, dense, form);
-      }
+  /// @param dense          null if no form needs it
+  /// @param base_from_rig  of this cloud; if unknown, all forms stay in the rig's frame
+  CloudFiles(const Cloud& cloud, const DenseCloud* dense, CloudFormats formats,
+             const std::optional<RigidTransform>& base_from_rig = {})
+      : base_from_rig_(base_from_rig) {
+    for (unsigned index = 0; index < CloudForm::kCount; ++index) {
+      const CloudForm form = CloudForm::of_index(index);
+      if (formats.has(form)) (void)file(cloud, dense, form);
     }
+  }
+
+  /// The transform of the points of a form; null: they are in the rig's frame.
+  [[nodiscard]] const RigidTransform* base_from_rig(CloudForm form) const {
+    return form.in_base && base_from_rig_ ? &*base_from_rig_ : nullptr;
   }
 
   /// Writes the file unless it exists already. @param cloud, dense  the same at each call
@@ -98,13 +113,15 @@ class CloudFiles {
   }
 
  private:
-  [[nodiscard]] static std::string write(const Cloud& cloud, const DenseCloud* dense, CloudForm form) {
+  [[nodiscard]] std::string write(const Cloud& cloud, const DenseCloud* dense, CloudForm form) const {
     const bool ply = form.format == CloudFormat::kPly;
-    if (!form.dense() || dense == nullptr) return ply ? write_ply(cloud) : write_pcd(cloud);
+    const RigidTransform* const place = base_from_rig(form);
+    if (!form.dense() || dense == nullptr) return ply ? write_ply(cloud, place) : write_pcd(cloud, place);
     if (form.format == CloudFormat::kTiff) return write_dense_tiff(*dense);
-    return ply ? write_dense_ply(*dense, form.normals) : write_dense_pcd(*dense, form.normals);
+    return ply ? write_dense_ply(*dense, form.normals, place) : write_dense_pcd(*dense, form.normals, place);
   }
 
+  std::optional<RigidTransform> base_from_rig_;
   std::array<SharedBytes, CloudForm::kCount> files_;
 };
 

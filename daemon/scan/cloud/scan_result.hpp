@@ -79,7 +79,8 @@ struct ScanRequest {
   CloudFormats formats = {};                ///< formats for the cloud's files
   std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
   bool why = false;                         ///< the picture shows each rejected region in the colour of its rule
-  bool of_stream = false;                   ///< one of a stream: pixels that do not move reuse earlier measurements
+  std::optional<RigidTransform> base_from_flange = {};  ///< the robot's pose at the exposure, if it is known
+  bool of_stream = false;  ///< one of a stream: pixels that do not move reuse earlier measurements
 };
 
 /// A request for one frame of one camera.

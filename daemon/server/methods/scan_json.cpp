@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "core/geometry/robot_pose.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/server/methods/counts_json.hpp"
 
@@ -107,6 +108,11 @@ json scan_json(const ScanResult& scan, Density density) {
     result["lost_tries"] = std::move(lost);
   }
   return result;
+}
+
+void add_frame(json& about, const RigidTransform* base_from_rig) {
+  if (base_from_rig != nullptr)
+    about["base_from_rig"] = robot_numbers(*base_from_rig, {TurnNumbers::kMatrix, /*unit_mm=*/1, /*unit_rad=*/1});
 }
 
 json reasons_json(const ScanResult& scan) {

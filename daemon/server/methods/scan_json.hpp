@@ -11,6 +11,10 @@ namespace slsd {
 /// Describes a scan for clients, without its cloud: id, time, number of points, regions by status, times.
 [[nodiscard]] nlohmann::json scan_json(const ScanResult& scan, Density density = Density::kSymbols);
 
+/// Adds `base_from_rig`, a 4x4 matrix row by row, to the description of a cloud in the robot's base.
+/// @param base_from_rig  null: the cloud is in the rig's frame, and nothing is added
+void add_frame(nlohmann::json& about, const RigidTransform* base_from_rig);
+
 /// The rules that rejected regions of a scan, or prevented their restoration, most frequent first. Each comes with its
 /// count, its status, its meaning and a remedy.
 [[nodiscard]] nlohmann::json reasons_json(const ScanResult& scan);

@@ -6,8 +6,10 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
 #include <asio/post.hpp>
 
+#include "core/geometry/robot_pose.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/methods/answer.hpp"
@@ -95,15 +97,79 @@ Outgoing frame_event(const std::string& scan_id, const FrameImage& frame, FrameC
   return event;
 }
 
-// The form of cloud that a request asks for; without a density, the configured one.
-CloudForm read_form(ParamReader& reader, const ServiceState& state) {
+enum class Delivery { kOnce, kStream };
+
+bool on_arm(const ScanSetup& setup) {
+  return setup.hand_eye && setup.hand_eye->mounted == Mounted::kArm;
+}
+
+// The form of cloud that a request asks for; without a density or frame, the configured one. No poses come with a
+// stream, so that of a scanner on the arm is in the rig's frame.
+CloudForm read_form(ParamReader& reader, const ServiceState& state, Delivery delivery) {
   CloudForm form(cloud_format(reader.choice("format", {"ply", "pcd", "tiff"})));
   const bool pixels = state.configuration.decode.density == Density::kPixels;
   const std::string density =
       pixels ? reader.choice("density", {"pixels", "symbols"}) : reader.choice("density", {"symbols", "pixels"});
   form.density = density == "pixels" ? Density::kPixels : Density::kSymbols;
   form.normals = reader.boolean("normals", false);
+  const bool base = state.configuration.frame.output == CoordinateFrame::kRobotBase &&
+                    (delivery == Delivery::kOnce || !on_arm(*state.scanner.setup()));
+  const std::string frame = base ? reader.choice("coordinate_frame", {"robot_base", "rig"})
+                                 : reader.choice("coordinate_frame", {"rig", "robot_base"});
+  form.in_base = frame == "robot_base" && form.format != CloudFormat::kTiff;
   return form;
+}
+
+// The robot's pose as its controller writes it.
+struct AskedPose {
+  std::vector<double> numbers;  ///< empty: none
+  std::string notation;
+};
+
+AskedPose read_asked_pose(ParamReader& reader) {
+  constexpr std::size_t kNumbersMax = 16;
+  std::vector<double> numbers = reader.numbers("robot_pose", kNumbersMax);
+  return {std::move(numbers), reader.text("poses")};
+}
+
+// Refuses a frame that is not possible, and a pose that is missing or useless.
+std::optional<RpcError> refused_frame(CloudForm form, const AskedPose& pose, const ScanSetup& setup,
+                                      Delivery delivery) {
+  const bool given = !pose.numbers.empty();
+  if (!form.in_base && given) {
+    return invalid_params(
+        "\"robot_pose\" is for points in the robot's base: leave it out, or ask for \"coordinate_frame\": "
+        "\"robot_base\"");
+  }
+  if (!form.in_base) return std::nullopt;
+  if (auto possible = setup.check_robot_base(); !possible) return rpc_error(possible.error());
+  if (!on_arm(setup) && given)
+    return invalid_params("the scanner stands in the cell, where no pose moves it: leave \"robot_pose\" out");
+  if (!on_arm(setup) || given) return std::nullopt;
+  if (delivery == Delivery::kStream) {
+    return invalid_params(
+        "the scanner is on the robot's arm, and no poses come with a stream: ask for \"coordinate_frame\": \"rig\"");
+  }
+  return invalid_params(
+      "the scanner is on the robot's arm: add the robot's pose as \"robot_pose\" and \"poses\", or ask for "
+      "\"coordinate_frame\": \"rig\"");
+}
+
+tl::expected<RigidTransform, RpcError> pose_of(const AskedPose& asked) {
+  constexpr double kNearestMm = 10, kFarthestMm = 20'000;  // of a flange from its base, with room to spare
+  if (asked.notation.empty()) {
+    return tl::unexpected(invalid_params(fmt::format("\"robot_pose\" needs \"poses\", how the robot writes them: {}",
+                                                     fmt::join(pose_notation_names(), ", "))));
+  }
+  const auto notation = pose_notation(asked.notation);
+  if (!notation) return tl::unexpected(invalid_params("\"poses\" " + notation.error().message));
+  const auto pose = read_robot_pose(asked.numbers, *notation);
+  if (!pose) return tl::unexpected(invalid_params("\"robot_pose\" " + pose.error().message));
+  const double distance_mm = pose->translation.norm();
+  if (distance_mm >= kNearestMm && distance_mm <= kFarthestMm) return *pose;
+  return tl::unexpected(
+      invalid_params(fmt::format("\"robot_pose\" puts the flange {:.4g} mm from the robot's base: in \"{}\" it has {}",
+                                 distance_mm, asked.notation, describe(*notation))));
 }
 
 // Refuses parameters that exclude each other.
@@ -121,6 +187,7 @@ Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameC
   reply.result["format"] = to_string(form.format);
   CloudFiles files = scan.files;
   const SharedBytes cloud = files.file(scan.cloud, scan.dense.get(), form);
+  add_frame(reply.result, files.base_from_rig(form));
   if (as_memfd) {
     auto memory = sealed_memory(*cloud);
     if (!memory) return tl::unexpected(rpc_error(memory.error()));
@@ -147,7 +214,8 @@ struct AskedScan {
 tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceState& state, const Session& session) {
   ParamReader reader(params);
   AskedScan asked;
-  asked.form = read_form(reader, state);
+  asked.form = read_form(reader, state, Delivery::kOnce);
+  const AskedPose pose = read_asked_pose(reader);
   asked.as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
   asked.request.deadline = deadline_in(read_timeout(reader, state));
   asked.request.picture = reader.boolean("picture", false);
@@ -160,6 +228,13 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
   asked.request.gone = session.gone();
   asked.preset = reader.text("preset");
   if (auto error = reader.error()) return tl::unexpected(*error);
+  if (auto refused = refused_frame(asked.form, pose, *state.scanner.setup(), Delivery::kOnce))
+    return tl::unexpected(*refused);
+  if (!pose.numbers.empty()) {
+    const auto base_from_flange = pose_of(pose);
+    if (!base_from_flange) return tl::unexpected(base_from_flange.error());
+    asked.request.base_from_flange = *base_from_flange;
+  }
   return asked;
 }
 
@@ -251,11 +326,13 @@ void run_frame(ServiceState& state, const json& params, Session& session, Respon
 
 void run_subscribe(ServiceState& state, const json& params, Session& session, Respond respond) {
   ParamReader reader(params);
-  const CloudForm form = read_form(reader, state);
+  const CloudForm form = read_form(reader, state, Delivery::kStream);
   const bool as_memfd = reader.choice("transport", {"inline", "memfd"}) == "memfd";
   const std::optional<double> rate_hz = reader.number("rate_hz", kRateMinHz, kRateMaxHz);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
+  if (auto refused = refused_frame(form, {}, *state.scanner.setup(), Delivery::kStream))
+    return respond(tl::unexpected(*refused));
   json result{{"format", to_string(form.format)}};
   if (form.dense()) result["density"] = to_string(form.density);
   result["rate_hz"] = rate_hz ? json(*rate_hz) : json();

@@ -47,8 +47,11 @@ void run_bundle(ServiceState& state, const json& params, Session& session, Respo
 void run_settings(ServiceState& state, const json& params, Session&, Respond respond) {
   const ParamReader reader(params);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
-  const ScanFiles files = state.scanner.setup()->files();
+  const SharedSetup setup = state.scanner.setup();
+  const ScanFiles files = setup->files();
   Reply reply{settings_json(state.configuration)};
+  if (setup->hand_eye)
+    reply.result["hand_eye"] = {{"mounted", setup->hand_eye->mounted == Mounted::kArm ? "arm" : "cell"}};
   reply.result["pattern"] = files.pattern;
   reply.result["calibration"] = files.calibration;
   reply.result["set"] = state.settings;

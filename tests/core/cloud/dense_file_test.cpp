@@ -98,6 +98,23 @@ TEST(DenseFile, HasAGridOfAllPixels) {
   }
 }
 
+TEST(DenseFile, OfTheRobotsBaseKeepsItsFrameInAPlyAndLeavesItForAGrid) {
+  const RigidTransform base_from_rig{(Eigen::Matrix3d() << 0, 0, 1, 1, 0, 0, 0, 1, 0).finished(), {1000, -200, 30}};
+  DenseFacts in_base = facts(false);
+  in_base.base_from_rig = base_from_rig;
+  std::string bytes = dense_pcd_header(in_base, kWidth, kHeight);
+  for (int pixel = 0; pixel < kWidth * kHeight; ++pixel) put_record(bytes, pixel, false, true);
+  const auto pixels = DensePcd::open(bytes, kHeight, false);
+  ASSERT_TRUE(pixels.has_value());
+  ASSERT_TRUE(pixels->base_from_rig());
+  const std::string as_ply = pixels->to_ply(facts(false));
+  EXPECT_THAT(as_ply, HasSubstr("comment base_from_rig 0 0 1 1000 1 0 0 -200 0 1 0 30\n"));
+  EXPECT_EQ(as_ply.substr(as_ply.find("end_header")), ply(false).substr(ply(false).find("end_header")));
+  // x, y, z of the base are z + 1000, x - 200, y + 30 of the rig.
+  EXPECT_LT((pixels->grid().points_mm[8] - Eigen::Vector3f(-47 + 200, 940 - 30, 94 - 1000)).norm(), 1e-3);
+  EXPECT_TRUE(std::isnan(pixels->grid().points_mm[1].z()));
+}
+
 TEST(DenseFile, HasALatticeOfEverySecondPixel) {
   const std::string bytes = pcd(true);
   const Cloud cloud = DensePcd::open(bytes, kHeight, true)->lattice(2);

@@ -62,6 +62,19 @@ TEST(WritePcd, LeavesOutWhatIsOutsideTheLattice) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_TRUE(std::isnan(cell(pcd, i).x));
 }
 
+TEST(WritePcd, TakesPointsIntoTheRobotsBase) {
+  const RigidTransform base_from_rig{(Eigen::Matrix3d() << 0, 0, 1, 1, 0, 0, 0, 1, 0).finished(), {1000, -200.5, 30}};
+  const Cloud cloud = any_cloud(5, 7, 4);
+  const std::string pcd = write_pcd(cloud, &base_from_rig);
+  EXPECT_THAT(pcd, HasSubstr("\n# base_from_rig 0 0 1 1000 1 0 0 -200.5 0 1 0 30\nVERSION 0.7\n"));
+  EXPECT_THAT(pcd, HasSubstr("\nVIEWPOINT 1000 -200.5 30 0.5 0.5 0.5 0.5\n"));
+  const CloudPoint& point = cloud.points.front();
+  const CloudPoint found = cell(pcd, (point.camera * 4U + point.row) * 7U + point.column);
+  EXPECT_FLOAT_EQ(found.x, point.z + 1000);
+  EXPECT_FLOAT_EQ(found.y, point.x - 200.5F);
+  EXPECT_FLOAT_EQ(found.z, point.y + 30);
+}
+
 TEST(WritePcd, IsEmptyWithoutALattice) {
   EXPECT_THAT(write_pcd({}), HasSubstr("WIDTH 0\nHEIGHT 0\n"));
 }

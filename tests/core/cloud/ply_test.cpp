@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/cloud/ply.hpp"
 
+#include <cstring>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -36,6 +38,44 @@ TEST(WritePly, KeepsAnIdFromBreakingTheHeader) {
   const auto read = read_ply(write_ply(cloud), "cloud.ply");
   ASSERT_TRUE(read) << to_string(read.error());
   EXPECT_EQ(read->scan_id, "one element vertex 99");
+}
+
+// x, y and z turned into each other, so that every number is exact.
+const RigidTransform kBaseFromRig{(Eigen::Matrix3d() << 0, 0, 1, 1, 0, 0, 0, 1, 0).finished(), {1000, -200.5, 30}};
+
+TEST(WritePly, TakesPointsIntoTheRobotsBase) {
+  const Cloud cloud = any_cloud(7, 3, 2);
+  ASSERT_FALSE(cloud.points.empty());
+  const std::string text = write_ply(cloud, &kBaseFromRig);
+  EXPECT_THAT(text, HasSubstr("\ncomment coordinate_frame robot_base: the robot's\n"
+                              "comment base_from_rig 0 0 1 1000 1 0 0 -200.5 0 1 0 30\n"));
+  const std::size_t end = text.find("end_header\n") + 11;
+  float first[3];
+  std::memcpy(first, text.data() + end, sizeof first);
+  const CloudPoint& point = cloud.points.front();
+  EXPECT_FLOAT_EQ(first[0], point.z + 1000);
+  EXPECT_FLOAT_EQ(first[1], point.x - 200.5F);
+  EXPECT_FLOAT_EQ(first[2], point.y + 30);
+}
+
+TEST(ReadPly, TakesPointsOfTheRobotsBaseBackToTheRig) {
+  const Cloud cloud = any_cloud(7, 3, 2);
+  const auto read = read_ply(write_ply(cloud, &kBaseFromRig), "cloud.ply");
+  ASSERT_TRUE(read) << to_string(read.error());
+  ASSERT_EQ(read->points.size(), cloud.points.size());
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    EXPECT_NEAR(read->points[i].x, cloud.points[i].x, 1e-3);
+    EXPECT_NEAR(read->points[i].y, cloud.points[i].y, 1e-3);
+    EXPECT_NEAR(read->points[i].z, cloud.points[i].z, 1e-3);
+    EXPECT_EQ(read->points[i].camera_u, cloud.points[i].camera_u);
+  }
+  for (const char* wrong :
+       {"base_from_rig 0 0 1 1000 1 0 0 -200.5 0 1 0", "base_from_rig 0 0 nan 1000 1 0 0 1 0 1 0 30"}) {
+    std::string text = write_ply(cloud, &kBaseFromRig);
+    const std::size_t at = text.find("base_from_rig");
+    text.replace(at, text.find('\n', at) - at, wrong);
+    EXPECT_FALSE(read_ply(text, "cloud.ply")) << wrong;
+  }
 }
 
 TEST(ReadPly, RefusesEveryTruncation) {

@@ -32,6 +32,7 @@ void expect_equal(const Configuration& a, const Configuration& b) {
   EXPECT_EQ(a.decode, b.decode);
   EXPECT_EQ(a.scan, b.scan);
   EXPECT_EQ(a.server, b.server);
+  EXPECT_EQ(a.frame, b.frame);
   EXPECT_EQ(a.black_box, b.black_box);
 }
 

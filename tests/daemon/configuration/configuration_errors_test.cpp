@@ -25,6 +25,8 @@ TEST(ReadConfiguration, NamesThePlaceAndTheRemedy) {
             "etc/slsd.toml:3:15: [server] clients_max must be 1 to 10000, not 0");
   EXPECT_EQ(error_of("[projector]\ndriver = \"beamer\"\n"),
             "etc/slsd.toml:2:10: [projector] driver must be one of headless, glfw");
+  EXPECT_THAT(error_of("[frame]\noutput = \"robot_base\"\n"),
+              HasSubstr("needs hand_eye, the file that slsctl hand-eye"));
   EXPECT_EQ(error_of("[[camera]]\npath = \"a\"\n[[camera]]\npath = \"b\"\nname = \"camera\"\n"),
             "etc/slsd.toml:5:8: [[camera]] name \"camera\" is used twice: give each camera its own name");
 }

@@ -59,6 +59,9 @@ wrong_cells_max = 0.0001
 precision = "fine"
 find_regions = "paper"
 classify = "paper"
+[frame]
+output = "robot_base"
+hand_eye = "hand_eye.yml"
 [scan]
 timeout_ms = 1
 projector_latency_ms = 34.5
@@ -91,6 +94,8 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->cameras.at(0).faults.at(0).capture, 3U);
   EXPECT_EQ(configuration->calibration_file, "etc/calibration.yml");
   EXPECT_EQ(configuration->other_hardware, OtherHardware::kWarn);
+  EXPECT_EQ(configuration->frame.output, CoordinateFrame::kRobotBase);
+  EXPECT_EQ(configuration->frame.hand_eye, "etc/hand_eye.yml");
   EXPECT_EQ(configuration->decode.binarize, Method::kDefault);
   EXPECT_EQ(configuration->decode.precision, Precision::kFine);
   EXPECT_EQ(configuration->decode.find_regions, Method::kPaper);

@@ -57,5 +57,20 @@ TEST(ParamReader, RefusesWrongTypesAndRanges) {
   }
 }
 
+TEST(ParamReader, ReadsListsOfFiniteNumbers) {
+  const json params{{"robot_pose", {1, 2.5, -3e2}}};
+  ParamReader reader(params);
+  EXPECT_EQ(reader.numbers("robot_pose", 3), (std::vector<double>{1, 2.5, -300}));
+  EXPECT_TRUE(reader.numbers("other", 3).empty());
+  EXPECT_FALSE(reader.error());
+  for (const json& value : {json(1), json("1,2"), json::array(), json{1, 2, 3, 4}, json{1, nullptr, 3}, json{1, "2"}}) {
+    const json wrong{{"robot_pose", value}};
+    ParamReader refusing(wrong);
+    EXPECT_TRUE(refusing.numbers("robot_pose", 3).empty()) << value;
+    ASSERT_TRUE(refusing.error()) << value;
+    EXPECT_THAT(refusing.error()->message, HasSubstr("must be a list of 1 to 3 finite numbers"));
+  }
+}
+
 }  // namespace
 }  // namespace slsd

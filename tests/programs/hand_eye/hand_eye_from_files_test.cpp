@@ -13,7 +13,7 @@
 #include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
-#include "core/hand_eye/robot_pose.hpp"
+#include "core/geometry/robot_pose.hpp"
 #include "drivers/files/file.hpp"
 #include "tests/programs/calibrate/simulated_captures.hpp"
 

@@ -25,7 +25,10 @@ struct ScanOptions {
   bool frames = false;                      ///< the frames themselves
   bool why = false;  ///< list the rules that rejected regions, in `reasons` of the description; the picture marks each
                      ///< region by its rule
-  std::string preset;  ///< puts its settings into force, where they stay, and scans with them; empty: none
+  std::string preset;              ///< puts its settings into force, where they stay, and scans with them; empty: none
+  std::string coordinate_frame;    ///< "rig" or "robot_base"; empty: as configured
+  std::vector<double> robot_pose;  ///< the pose of the robot whose arm carries the scanner, in its own numbers
+  std::string poses;               ///< how the robot writes them: "ur", "kuka", ...; with robot_pose
 };
 
 struct StreamOptions {

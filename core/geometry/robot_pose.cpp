@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/hand_eye/robot_pose.hpp"
+#include "core/geometry/robot_pose.hpp"
 
 #include <algorithm>
 #include <array>

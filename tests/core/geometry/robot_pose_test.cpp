@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/hand_eye/robot_pose.hpp"
+#include "core/geometry/robot_pose.hpp"
 
 #include <cmath>
 #include <limits>
 #include <random>
 
 #include <gmock/gmock.h>
-
-#include "tests/core/hand_eye/simulated_robot.hpp"
+#include <Eigen/Geometry>
 
 namespace slsd {
 namespace {
@@ -76,7 +75,9 @@ TEST(ReadRobotPose, ReadsWhatRobotNumbersWrites) {
     const PoseNotation notation = *pose_notation(name);
     EXPECT_EQ(name_of(notation), name);
     for (int i = 0; i < 50; ++i) {
-      const RigidTransform pose{turned_by({normal(random), normal(random), normal(random)}),
+      const double angle = normal(random);
+      const Eigen::Vector3d axis = Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+      const RigidTransform pose{Eigen::AngleAxisd(angle, axis).toRotationMatrix(),
                                 {500 * normal(random), 500 * normal(random), 500 * normal(random)}};
       const std::vector<double> numbers = robot_numbers(pose, notation);
       EXPECT_EQ(numbers.size(), notation.count());
