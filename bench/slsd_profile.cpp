@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -99,6 +100,7 @@ class StageMeter final : public DenseObserver {
 struct Request {
   std::string frame, pattern, calibration;
   int stride_px = DenseOptions{}.stride_px, repeat = 15;
+  double part = 1;  ///< share of the frame to measure, in its middle
   bool without_anchor = false;
 };
 
@@ -121,6 +123,31 @@ void print_row(std::string_view name, double least_ms, double median_ms, double 
               millions(last.cache_misses, kCacheLineBytes).c_str());
 }
 
+/// The middle of a frame.
+PixelRectangle middle_of(const Lens& lens, double share) {
+  const auto from = [&](int px) { return static_cast<int>((1 - std::sqrt(share)) / 2 * px); };
+  return {from(lens.width_px), from(lens.height_px), lens.width_px - from(lens.width_px),
+          lens.height_px - from(lens.height_px)};
+}
+
+/// Compares the points of a part with those of the whole frame there.
+void print_differences(const DenseMap& part, const DenseMap& whole) {
+  std::size_t both = 0, only_part = 0, only_whole = 0;
+  std::vector<double> sigmas{0};
+  const PixelRectangle& pixels = part.part;
+  for (int y = pixels.top; y < pixels.bottom; ++y) {
+    for (int x = pixels.left; x < pixels.right; ++x) {
+      const std::size_t at = static_cast<std::size_t>(y) * whole.width + x;
+      only_part += part.measured(at) && !whole.measured(at), only_whole += whole.measured(at) && !part.measured(at);
+      if (!part.measured(at) || !whole.measured(at)) continue;
+      ++both;
+      sigmas.push_back(std::abs(static_cast<double>((part.depth_mm[at] - whole.depth_mm[at]) / whole.sigma_mm[at])));
+    }
+  }
+  std::printf("%zu points as in the whole frame, %zu not there, %zu only there; depths differ by %.5f sigma at most\n",
+              both, only_part, only_whole, std::ranges::max(sigmas));
+}
+
 Result<> profile(const Request& request) {
   const auto pattern_text = read_file(request.pattern, kLargestFileBytes);
   if (!pattern_text) return tl::unexpected(pattern_text.error());
@@ -137,12 +164,13 @@ Result<> profile(const Request& request) {
   auto decoder = Decoder::create(*pattern, *calibration, 0, options);
   if (!decoder) return tl::unexpected(decoder.error());
   DenseMapper mapper(*pattern, *calibration, 0, options);
+  if (request.part < 1) mapper.set_part(middle_of(calibration->cameras[0].lens, request.part));
   const GreyView pixels = view(*frame);
   const double full = guess_full_level(pixels);
   OpencvAnchor anchor;
   SerialExecutor executor;
   StageMeter meter;
-  std::vector<double> anchors, wholes;
+  std::vector<double> anchors, wholes, denses;
   std::array<std::vector<double>, 1 + kDenseStageCount> stages;
   std::uint32_t points = 0;
   for (int i = 0; i <= request.repeat; ++i) {
@@ -159,7 +187,7 @@ Result<> profile(const Request& request) {
     double whole = 0;
     for (std::size_t stage = 0; stage < stages.size(); ++stage)
       stages[stage].push_back(meter.costs[stage].ms), whole += meter.costs[stage].ms;
-    wholes.push_back(whole);
+    wholes.push_back(whole), denses.push_back(whole - meter.costs[0].ms);
   }
   const double anchor_ms = std::ranges::min(anchors);
   std::printf("%-12s %9s %9s %9s %14s %10s\n", "stage", "least ms", "median", "/ anchor", "M instructions",
@@ -171,10 +199,16 @@ Result<> profile(const Request& request) {
     if (cost.instructions) sum.instructions = sum.instructions.value_or(0) + *cost.instructions;
     if (cost.cache_misses) sum.cache_misses = sum.cache_misses.value_or(0) + *cost.cache_misses;
   }
+  print_row("dense", std::ranges::min(denses), median(denses), anchor_ms, {});
   print_row("whole", std::ranges::min(wholes), median(wholes), anchor_ms, sum);
   print_row("anchor", anchor_ms, median(anchors), anchor_ms, {});
   std::printf("%u points, stride %d px, one core; the least and the median of %d frames\n", points,
               DenseMapper::stride_px(calibration->cameras[0].lens, options.dense), request.repeat);
+  if (request.part < 1) {
+    DenseMapper of_whole(*pattern, *calibration, 0, options);
+    const DenseMap part = mapper.measure(pixels, full, decoder->symbols(), executor);
+    print_differences(part, of_whole.measure(pixels, full, decoder->symbols(), executor));
+  }
   if (!sum.instructions) std::puts("this machine counts no instructions and no cache misses");
   return {};
 }
@@ -192,6 +226,7 @@ int main(int argc, char** argv) {
   app.add_option("--calibration", request.calibration, "Calibration (default: calibration.yml beside the frame)");
   app.add_option("--stride", request.stride_px, "dense_stride_px")->check(CLI::Range(1, 16))->capture_default_str();
   app.add_option("--repeat", request.repeat, "Number of frames")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--part", request.part, "Share of the frame to measure, in its middle")->check(CLI::Range(0.001, 1.0));
   app.add_flag("--no-anchor", request.without_anchor, "Do not measure the anchor; for samplers");
   CLI11_PARSE(app, argc, argv);
   const auto beside = std::filesystem::path(request.frame).parent_path();

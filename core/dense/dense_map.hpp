@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "core/geometry/measured_box.hpp"
+
 namespace slsd {
 
 /// Status of a camera pixel. All but kMeasured are reasons why it has no point.
@@ -23,8 +25,10 @@ enum class DensePixel : std::uint8_t {
   kUnlit,           ///< dark where the pattern is dark, at a boundary: there is no evidence for the surface
   kSmallComponent,  ///< too few connected pixels
   kAtAnEdge,        ///< closer to a hole or a jump than dense_prune_px
+  kOutsideBox,      ///< outside the box to measure
+  kThinned,         ///< another point stands for it: stride, voxel_mm
 };
-inline constexpr int kDensePixelCount = 9;
+inline constexpr int kDensePixelCount = 11;
 /// Change of depth between adjacent pixels, as a share of the depth, above which there is a jump to another surface.
 inline constexpr float kDepthJump = 0.004F;
 
@@ -41,20 +45,22 @@ struct DenseMap {
   std::vector<DensePixel> pixels;
   std::vector<std::uint8_t> firm;  ///< 1 if the pixel itself shows the expected light, or all pixels around it do
   std::array<std::uint32_t, kDensePixelCount> counts{};  ///< pixels by their status
+  PixelRectangle part;                                   ///< all pixels outside it are kOutsideBox
 
   /// Resizes the map; its contents are then undefined.
   void resize(int to_width, int to_height) {
     width = to_width, height = to_height;
+    part = {0, 0, width, height};
     const std::size_t count = static_cast<std::size_t>(width) * height;
     depth_mm.resize(count), sigma_mm.resize(count), intensity.resize(count), pixels.resize(count), firm.resize(count);
   }
   /// Clears pixels: nothing is measured there.
-  void clear(std::size_t first, int count) {
+  void clear(std::size_t first, int count, DensePixel why = DensePixel::kNotReached) {
     const auto fill = [&](auto& values, auto none) {
       std::fill_n(values.begin() + static_cast<std::ptrdiff_t>(first), count, none);
     };
     fill(depth_mm, std::numeric_limits<float>::quiet_NaN()), fill(sigma_mm, std::numeric_limits<float>::quiet_NaN());
-    fill(intensity, std::uint8_t{0}), fill(pixels, DensePixel::kNotReached), fill(firm, std::uint8_t{0});
+    fill(intensity, std::uint8_t{0}), fill(pixels, why), fill(firm, std::uint8_t{0});
   }
   void reset(int to_width, int to_height) {
     resize(to_width, to_height);
@@ -64,14 +70,11 @@ struct DenseMap {
     return depth_mm.capacity() * sizeof(float) + sigma_mm.capacity() * sizeof(float) + intensity.capacity() +
            pixels.capacity() + firm.capacity();
   }
-  void count_pixels() {
-    counts.fill(0);
-    // Four tallies: most pixels have the status of the previous one, and would wait for its count.
-    std::array<std::array<std::uint32_t, kDensePixelCount>, 4> tallies{};
-    for (std::size_t i = 0; i < pixels.size(); ++i) ++tallies[i % 4][static_cast<std::size_t>(pixels[i])];
-    for (const auto& tally : tallies)
-      for (int i = 0; i < kDensePixelCount; ++i) counts[i] += tally[i];
-  }
+  /// Makes this the map of a frame of which only a part was measured, from the map of that part and some around it.
+  /// @param left, top  place in this map of the other's first pixel
+  void take_part(const DenseMap& measured, int left, int top, const PixelRectangle& of_frame, int to_width,
+                 int to_height);
+  void count_pixels();
   void drop(std::size_t pixel, DensePixel why) {
     depth_mm[pixel] = sigma_mm[pixel] = std::numeric_limits<float>::quiet_NaN();
     intensity[pixel] = 0;

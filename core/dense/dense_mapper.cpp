@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include <Eigen/LU>
 
@@ -42,19 +43,23 @@ std::string_view to_string(DenseStage stage) {
   return kNames[static_cast<std::size_t>(stage)];
 }
 
-std::string_view to_string(DensePixel pixel) {
-  constexpr std::array<std::string_view, kDensePixelCount> kNames{"measured",  "not_reached",        "no_support",
-                                                                  "saturated", "out_of_depth_range", "occluded",
-                                                                  "unlit",     "small_component",    "at_an_edge"};
-  return kNames[static_cast<std::size_t>(pixel)];
-}
-
 struct DenseMapper::Fixed {
   PatchGeometry geometry;
   DecodeOptions decode;
   int letters, window_px, reach_px, close_px;
-  PatternFields fields;
+  std::shared_ptr<const PatternFields> fields;  // shared with parts of the frame
   std::shared_ptr<const RayGrid> rays;
+
+  /// The same for a camera that sees only these pixels.
+  [[nodiscard]] std::shared_ptr<const Fixed> of_part(const PixelRectangle& pixels, int stride_px) const {
+    CalibratedCamera camera = geometry.camera;
+    camera.lens = pixels.crop(camera.lens);
+    DecodeOptions options = decode;
+    options.dense.stride_px = stride_px;
+    return std::shared_ptr<const Fixed>(new Fixed{PatchGeometry(camera, geometry.projector), options, letters,
+                                                  window_px, reach_px, close_px, fields,
+                                                  std::make_shared<const RayGrid>(camera.lens)});
+  }
 };
 
 DenseMapper::DenseMapper(const Pattern& pattern, const Calibration& calibration, std::size_t camera_index,
@@ -63,10 +68,11 @@ DenseMapper::DenseMapper(const Pattern& pattern, const Calibration& calibration,
         const CalibratedCamera& camera = calibration.cameras[camera_index];
         const ExpectedFrames expected(camera, calibration.projector, decode.middle_depth_mm());
         const double pitch = pattern.pitch_px() * static_cast<double>(expected.in_the_middle().scale);
-        return std::shared_ptr<const Fixed>(new Fixed{
-            PatchGeometry(camera, calibration.projector), decode, pattern.letters(),
-            slsd::window_px(pitch, stride_px(camera.lens, decode.dense)), judge_reach_px(pitch), slsd::close_px(pitch),
-            PatternFields(draw_pattern(pattern)), std::make_shared<const RayGrid>(camera.lens)});
+        return std::shared_ptr<const Fixed>(
+            new Fixed{PatchGeometry(camera, calibration.projector), decode, pattern.letters(),
+                      slsd::window_px(pitch, stride_px(camera.lens, decode.dense)), judge_reach_px(pitch),
+                      slsd::close_px(pitch), std::make_shared<const PatternFields>(draw_pattern(pattern)),
+                      std::make_shared<const RayGrid>(camera.lens)});
       }()) {}
 
 DenseMapper::DenseMapper(std::shared_ptr<const Fixed> fixed)
@@ -94,7 +100,8 @@ int DenseMapper::window_px() const {
 }
 
 std::size_t DenseMapper::bytes() const {
-  return grid_.bytes() + refiner_.bytes() + follower_.bytes() + occlusion_.bytes() + cleaner_.bytes() + map_.bytes();
+  return grid_.bytes() + refiner_.bytes() + follower_.bytes() + occlusion_.bytes() + cleaner_.bytes() + map_.bytes() +
+         (of_part_ ? of_part_->bytes() : 0);
 }
 
 std::size_t DenseMapper::bytes_of_fields(const Lens& projector) {
@@ -116,7 +123,7 @@ int DenseMapper::stride_px(const Lens& camera, const DenseOptions& options) {
 }
 
 void DenseMapper::warm_up() {
-  (void)fixed_->fields.usual();
+  (void)fixed_->fields->usual();
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
 }
 
@@ -151,7 +158,7 @@ DenseFrame DenseMapper::develop(const DenseFrame& frame) {
 DenseFrame DenseMapper::find_pattern(const DenseFrame& frame) {
   DenseFrame light = frame;
   field_ = find_field_and_tone(
-      fixed_->fields, tone_, [&] { light = develop(frame); },
+      *fixed_->fields, tone_, [&] { light = develop(frame); },
       [&](const PatternField& field) {
         grid_.find_epipolar_offset(light, field, seeds_);
         return grid_.look_at_blur(light, field, seeds_);
@@ -159,27 +166,32 @@ DenseFrame DenseMapper::find_pattern(const DenseFrame& frame) {
   return light;
 }
 
-DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
-                               DenseObserver* observer, bool next) {
+void DenseMapper::set_part(const std::optional<PixelRectangle>& part) {
+  part_ = part;
+  if (!part || part->empty()) return;
+  const Lens& lens = fixed_->geometry.camera.lens;
+  const int stride = grid_.stride_px(), coarse = refiner_.lattice().step * stride;
+  // A pixel's point depends on the nodes in its surroundings, on those fused with them twice, and on the coarse nodes
+  // around these. The coarse nodes and the rays of the part are those of the whole frame.
+  const int reach = fixed_->reach_px + 2 * SurfaceGrid::kFuseReach * stride + coarse + refiner_.window_px() / 2;
+  const int unit = std::lcm(coarse, RayGrid::kPitchPx);
+  PixelRectangle around = part->widened(reach, lens);
+  around.left -= around.left % unit, around.top -= around.top % unit;
+  if (of_part_ && around == around_part_) return;
+  around_part_ = around;
+  of_part_.reset(new DenseMapper(fixed_->of_part(around, stride)));
+}
+
+/// Measures the surface from the seeds, in a frame whose blur, offset and tone curve are known.
+/// @param within  pixels that matter
+/// @param from    the previous frame of a stream; null if there is none
+void DenseMapper::map_surface(const DenseFrame& seen, const PixelRectangle& within, const FollowedFrame* from,
+                              bool next, Executor& executor, DenseObserver* observer) {
   const auto done = [&](DenseStage stage) {
     if (observer != nullptr) observer->stage_done(stage);
   };
-  const DenseFrame taken{frame, full, symbols.noise};
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
-  find_seeds(symbols);
-  tone_.set_power(next ? follower_.tone_power() : 1);
-  DenseFrame seen = develop(taken);
-  const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
-  followed_ = from ? follower_.followed() : 0, across_px_ = from ? follower_.across_px() : 0;
-  if (from) {
-    field_ = from->pattern_field;
-    grid_.set_epipolar_offset(from->epipolar);
-  } else {
-    grid_.clear();
-    seen = find_pattern(taken);
-  }
   const PatternField& field = *field_;
-  done(DenseStage::kFindBlur);
   if (refiner_.lattice().step > 1) {
     grid_.grow_coarse(seen, field, seeds_, refiner_.lattice(), executor);
     refiner_.refine(seen, field, grid_, executor);
@@ -187,7 +199,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   grid_.grow(seen, field, seeds_, executor);
   done(DenseStage::kGrow);
   const auto of_symbols = static_cast<std::ptrdiff_t>(seeds_.size());
-  if (from) seeds_.insert(seeds_.end(), from->found.begin(), from->found.end());
+  if (from != nullptr) seeds_.insert(seeds_.end(), from->found.begin(), from->found.end());
   if (const auto found = search_.find(seen, field, grid_, executor); !found.empty()) {
     grid_.grow_on(seen, field, found, executor);
     seeds_.insert(seeds_.end(), found.begin(), found.end());
@@ -196,7 +208,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   done(DenseStage::kSearch);
   grid_.fuse(executor);
   done(DenseStage::kFuse);
-  judge_.judge(seen, field, grid_, map_, executor);
+  judge_.judge(seen, field, grid_, map_, within, executor);
   done(DenseStage::kJudge);
   occlusion_.drop_occluded(map_, executor);
   cleaner_.drop_unlit_boundaries(map_, fixed_->close_px);
@@ -209,8 +221,63 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
     for (std::uint8_t& intensity : map_.intensity) intensity = levels[intensity];
   }
   map_.count_pixels();
+}
+
+/// Measures the part as the whole frame of another camera.
+void DenseMapper::map_part(const DenseFrame& seen, Executor& executor, DenseObserver* observer) {
+  const PixelRectangle& around = around_part_;
+  const Eigen::Vector2f first(static_cast<float>(around.left), static_cast<float>(around.top));
+  DenseMapper& mapper = *of_part_;
+  mapper.seeds_.clear();
+  for (const SurfaceSeed& seed : seeds_)
+    if (around.contains(static_cast<int>(seed.camera_px.x()), static_cast<int>(seed.camera_px.y())))
+      mapper.seeds_.push_back({seed.camera_px - first, seed.plane});
+  mapper.field_ = field_;
+  mapper.tone_.set_power(tone_.power());
+  EpipolarOffset offset = grid_.epipolar_offset();
+  offset.middle_px -= first;
+  mapper.grid_.clear();
+  mapper.grid_.set_epipolar_offset(offset);
+  DenseFrame cropped = seen;
+  cropped.pixels = around.crop(seen.pixels);
+  const int judged = 2 * fixed_->close_px + static_cast<int>(std::ceil(fixed_->decode.dense.prune_px));
+  const PixelRectangle within{part_->left - around.left - judged, part_->top - around.top - judged,
+                              part_->right - around.left + judged, part_->bottom - around.top + judged};
+  mapper.map_surface(cropped, within, nullptr, false, executor, observer);
+  map_.take_part(mapper.map_, around.left, around.top, *part_, fixed_->geometry.camera.lens.width_px,
+                 fixed_->geometry.camera.lens.height_px);
+}
+
+DenseMap& DenseMapper::measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
+                               DenseObserver* observer, bool next) {
+  if (part_ && part_->empty()) {
+    const Lens& lens = fixed_->geometry.camera.lens;
+    map_.take_part({}, 0, 0, *part_, lens.width_px, lens.height_px);
+    return map_;
+  }
+  const DenseFrame taken{frame, full, symbols.noise};
+  next = next && !part_;
+  find_seeds(symbols);
+  tone_.set_power(next ? follower_.tone_power() : 1);
+  DenseFrame seen = develop(taken);
+  const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
+  followed_ = from ? follower_.followed() : 0, across_px_ = from ? follower_.across_px() : 0;
+  if (from) {
+    field_ = from->pattern_field;
+    grid_.set_epipolar_offset(from->epipolar);
+  } else {
+    if (!part_) grid_.clear();
+    seen = find_pattern(taken);
+  }
+  if (observer != nullptr) observer->stage_done(DenseStage::kFindBlur);
+  if (part_) {
+    map_part(seen, executor, observer);
+  } else {
+    map_surface(seen, {0, 0, fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px}, from.get(),
+                next, executor, observer);
+  }
   if (next) follower_.finish(map_, grid_);
-  done(DenseStage::kClean);
+  if (observer != nullptr) observer->stage_done(DenseStage::kClean);
   return map_;
 }
 

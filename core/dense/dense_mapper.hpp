@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "core/dense/search_surface.hpp"
 #include "core/dense/surface_grid.hpp"
 #include "core/executor.hpp"
+#include "core/geometry/measured_box.hpp"
 
 namespace slsd {
 
@@ -56,6 +58,11 @@ class DenseMapper {
                          DenseObserver* observer = nullptr) {
     return measure(frame, full, symbols, executor, observer, true);
   }
+
+  /// Limits measuring to these pixels of the frame; empty: all of them. They get the points that they have in the whole
+  /// frame, except where only surfaces outside the part hide them from the projector. In a stream, too, each frame of a
+  /// part is measured afresh.
+  void set_part(const std::optional<PixelRectangle>& part);
 
   /// Frees what measure_next() keeps of frames. @thread reentrant, even during measurements
   void end_stream() { follower_.forget(); }
@@ -96,6 +103,9 @@ class DenseMapper {
   [[nodiscard]] DenseFrame find_pattern(const DenseFrame& frame);
   DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                     DenseObserver* observer, bool next);
+  void map_surface(const DenseFrame& seen, const PixelRectangle& within, const FollowedFrame* from, bool next,
+                   Executor& executor, DenseObserver* observer);
+  void map_part(const DenseFrame& seen, Executor& executor, DenseObserver* observer);
 
   std::shared_ptr<const Fixed> fixed_;  // shared by mappers of several threads
   SurfaceGrid grid_;
@@ -111,6 +121,9 @@ class DenseMapper {
   ToneCurve tone_;
   std::shared_ptr<const PatternField> field_;  // the pattern as the last frame shows it
   DenseMap map_;
+  std::optional<PixelRectangle> part_;
+  std::unique_ptr<DenseMapper> of_part_;  // of a camera that sees the part and some pixels around it
+  PixelRectangle around_part_;            // what it sees
 };
 
 }  // namespace slsd

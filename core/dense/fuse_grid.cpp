@@ -13,7 +13,7 @@ namespace slsd {
 namespace {
 
 /// Reach of a node in fusing, in nodes.
-constexpr int kFuseReach = 2;
+constexpr int kFuseReach = SurfaceGrid::kFuseReach;
 constexpr float kFusePx = 0.015F;  // error of the pattern's model, in each node
 constexpr float kFuseSigmas = 3;
 /// Limits for taking the mean: the scatter of the surrounding nodes over their noise, and a node's move by the bend

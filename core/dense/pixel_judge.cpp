@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -367,9 +368,26 @@ struct Claim {
 
 }  // namespace
 
+/// The plane with the most evidence all around, if there is enough and all planes are one surface there: nothing
+/// contests it. -1 if it takes more to tell, which costs several times as much.
+int PixelJudge::choose_on_one_surface(const Cell& cell, const Scratch& scratch, int at, int x, int y) const {
+  int chosen = -1;
+  float most = kEvidenceMin, low = std::numeric_limits<float>::max(), high = std::numeric_limits<float>::lowest(),
+        per_px = std::numeric_limits<float>::max();
+  for (int k = 0; k < cell.count; ++k) {
+    const float value = cell.value(k, static_cast<float>(x), static_cast<float>(y));
+    low = std::min(low, value), high = std::max(high, value);
+    per_px = std::min(per_px, std::abs(cell.candidates[k]->per_px));
+    if (const float around = scratch.least[k][at]; around > most || (chosen < 0 && around == most))
+      chosen = k, most = around;
+  }
+  return high - low <= kOtherPx * per_px ? chosen : -1;
+}
+
 /// The plane with the strongest claim that no other surface's claim contests; -1 if there is none.
 int PixelJudge::choose_plane(const Cell& cell, const Scratch& scratch, int x, int y) const {
   const int at = (y - cell.top) * cell.grid.stride_px() + x - cell.left;
+  if (const int only = choose_on_one_surface(cell, scratch, at, x, y); only >= 0) return only;
   std::array<Claim, kCandidates> all;
   for (int k = 0; k < cell.count; ++k) {
     const SideEvidence& evidence = scratch.sides[k][at];
@@ -478,7 +496,7 @@ void PixelJudge::resize(const SurfaceGrid& grid, int workers) {
 }
 
 void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, DenseMap& map,
-                       Executor& executor) {
+                       const PixelRectangle& within, Executor& executor) {
   const int stride = grid.stride_px();
   resize(grid, executor.workers());
   for (Scratch& scratch : scratch_) scratch.blender.begin(frame.full);
@@ -488,13 +506,13 @@ void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const
     Scratch& scratch = scratch_[worker];
     const std::span<const CellKind> kinds = scratch.blender.blend_row(grid, row, map);
     for (int column = -1; column < grid.columns(); ++column) {
-      const bool within = column >= 0 && column + 1 < grid.columns();
-      const CellKind kind = within ? kinds[column] : CellKind::kApart;
+      const bool inside = column >= 0 && column + 1 < grid.columns();
+      const CellKind kind = inside ? kinds[column] : CellKind::kApart;
       if (kind == CellKind::kClean) continue;
       Cell cell{frame, field, grid, map, column, row, 0, 0, 0, 0};
       cell.left = std::max(0, grid.x_of(column)), cell.top = top;
       cell.right = std::min(map.width, grid.x_of(column) + stride), cell.bottom = bottom;
-      if (cell.left >= cell.right) continue;
+      if (cell.left >= cell.right || !within.meets({cell.left, cell.top, cell.right, cell.bottom})) continue;
       if (kind == CellKind::kDoubtful) {
         review(cell, scratch);
       } else {

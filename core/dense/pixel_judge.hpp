@@ -39,8 +39,10 @@ class PixelJudge {
   };
   explicit PixelJudge(const Options& options) : options_(options) {}
 
+  /// @param within  pixels that matter: elsewhere, cells of several surfaces have no points, and others are not
+  /// reviewed
   void judge(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, DenseMap& map,
-             Executor& executor);
+             const PixelRectangle& within, Executor& executor);
 
  private:
   static constexpr int kCandidates = 6;
@@ -57,6 +59,7 @@ class PixelJudge {
   void see(const Cell& cell, Scratch& scratch) const;
   void weigh(const Cell& cell, const SurfaceNode& node, int candidate, int as, Scratch& scratch) const;
   void choose(const Cell& cell, const Scratch& scratch) const;
+  [[nodiscard]] int choose_on_one_surface(const Cell& cell, const Scratch& scratch, int at, int x, int y) const;
   [[nodiscard]] int choose_plane(const Cell& cell, const Scratch& scratch, int x, int y) const;
 
   Options options_;

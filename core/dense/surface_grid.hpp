@@ -157,6 +157,9 @@ class SurfaceGrid {
   /// Options for aligning nodes: on most objects, light and colour change by some 2 % of the gain for one camera px.
   static constexpr AlignOptions kAlign{.gain_slope_sigma = 0.02F};
 
+  /// Reach of a node in fuse(), in nodes.
+  static constexpr int kFuseReach = 2;
+
   /// Makes a node from a fit, if it is good.
   [[nodiscard]] bool accept(const PatchTask& task, SurfaceNode& node) const;
   /// Returns the places of a row's nodes, for fits of a whole row.
