@@ -174,7 +174,7 @@ void DenseMapper::set_part(const std::optional<PixelRectangle>& part) {
   // A pixel's point depends on the nodes in its surroundings, on those fused with them twice, and on the coarse nodes
   // around these. The coarse nodes and the rays of the part are those of the whole frame.
   const int reach = fixed_->reach_px + 2 * SurfaceGrid::kFuseReach * stride + coarse + refiner_.window_px() / 2;
-  const int unit = std::lcm(coarse, RayGrid::kPitchPx);
+  const int unit = std::max(1, std::lcm(coarse, RayGrid::kPitchPx));
   PixelRectangle around = part->widened(reach, lens);
   around.left -= around.left % unit, around.top -= around.top % unit;
   if (of_part_ && around == around_part_) return;
