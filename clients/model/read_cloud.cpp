@@ -21,6 +21,7 @@ struct CloudLayout {
   std::array<std::optional<std::size_t>, kNames.size()> offsets;
   std::size_t record_bytes = 0, points = 0;
   bool symbols = false;
+  bool rig = true;  ///< its points are in the rig's frame
 };
 
 /// The text before a mark, which both leave `text`; nothing if there is no mark.
@@ -54,7 +55,8 @@ bool read_number(std::string_view text, std::size_t& number) {
 
 /// Takes the header from the bytes.
 std::optional<CloudLayout> take_header(std::string_view& bytes) {
-  constexpr std::string_view kVertices = "element vertex ", kProperty = "property ";
+  constexpr std::string_view kVertices = "element vertex ", kProperty = "property ",
+                             kFrame = "comment coordinate_frame ";
   if (take_until(bytes, '\n') != "ply" || take_until(bytes, '\n') != "format binary_little_endian 1.0")
     return std::nullopt;
   CloudLayout layout;
@@ -62,6 +64,7 @@ std::optional<CloudLayout> take_header(std::string_view& bytes) {
     if (*line == "end_header") return layout;
     if (line->starts_with(kVertices) && !read_number(line->substr(kVertices.size()), layout.points))
       return std::nullopt;
+    if (line->starts_with(kFrame)) layout.rig = line->substr(kFrame.size()).starts_with("rig");
     // Properties of symbols may have other types.
     if (line->starts_with(kProperty) && !add_property(layout, line->substr(kProperty.size())) && !layout.symbols)
       return std::nullopt;
@@ -85,6 +88,10 @@ Result<std::vector<MeasuredPoint>> read_cloud(std::string_view bytes) {
     return fail(ErrorCode::kUnsupported,
                 "has a point for each symbol; a model needs one for each pixel: set [decode] density = \"pixels\" in "
                 "slsd.toml, and record again");
+  if (!layout->rig)
+    return fail(ErrorCode::kUnsupported,
+                "has its points in the robot's base; a model needs them in the scanner's frame: scan with "
+                "--coordinate-frame rig");
   const bool complete = std::ranges::all_of(layout->offsets, [](const auto& offset) { return offset.has_value(); });
   if (!complete) return fail(ErrorCode::kMalformed, "is not a dense cloud: it lacks sigma_mm, intensity or camera");
   if (bytes.size() / layout->record_bytes < layout->points)

@@ -46,6 +46,11 @@ TEST(ReadCloud, SkipsNormals) {
   EXPECT_EQ((*read_cloud(bytes))[1].place_mm.z(), 600);
 }
 
+TEST(ReadCloud, RefusesPointsInTheRobotsBase) {
+  std::string bytes = dense_ply_header({"id", "", 1, 1, false, RigidTransform()}, 1) + record(1, 2, 600, 1, 'i', '\0');
+  EXPECT_THAT(read_cloud(bytes).error().message, HasSubstr("--coordinate-frame rig"));
+}
+
 TEST(ReadCloud, RefusesWhatIsCutOrAnotherFile) {
   std::string cut = cloud(3);
   cut.pop_back();
