@@ -242,7 +242,7 @@ class Model(unittest.TestCase):
         def answer(request):
             if request["method"] == "settings":
                 return result(request, calibration=calibration())
-            self.assertEqual(request["params"], {"format": "ply", "density": "pixels"})
+            self.assertEqual(request["params"], {"format": "ply", "density": "pixels", "coordinate_frame": "rig"})
             number = len(asked)
             asked.append(request)
             if number in dict(errors):
