@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "core/cloud/coordinate_frame.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>

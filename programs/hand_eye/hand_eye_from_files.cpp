@@ -226,7 +226,7 @@ HandEyeCalibration to_keep(const HandEyeResult& result, const Board& board, cons
   return kept;
 }
 
-/// Whether further poses cure it.
+/// Tells whether further poses cure it.
 bool lacks_poses(const HandEyeFinding& finding) {
   using Fault = HandEyeFinding::Fault;
   return finding.fault == Fault::kTooFewPoses || finding.fault == Fault::kOneAxis ||
