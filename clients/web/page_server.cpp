@@ -11,6 +11,7 @@
 
 #include "clients/connection/connection.hpp"
 #include "clients/slsctl/client_commands.hpp"
+#include "clients/web/boards.hpp"
 #include "core/base64.hpp"
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
@@ -88,7 +89,7 @@ Answer cloud_answer(client::Bytes bytes, const json& about) {
 json brief(const json& about) {
   json result = json::object();
   for (const char* key : {"scan", "time", "points", "density", "capture_ms", "decode_ms", "latency_ms", "lost", "tries",
-                          "saturated", "sigma_calibration_mm", "width_px", "height_px", "empty"}) {
+                          "saturated", "sigma_calibration_mm", "width_px", "height_px", "empty", "preset"}) {
     if (about.contains(key)) result[key] = about[key];
   }
   return result;
@@ -242,6 +243,9 @@ void PageServer::add_requests() {
     const auto advice = look_at_exposure(options);
     return advice ? json_answer(*advice) : refusal(advice.error());
   });
+  get("/api/presets", [this](const Request&) { return result_or_refusal(call("presets", json::object(), kTimeout)); });
+  get("/api/boards", [this](const Request&) { return boards(); });
+  get("/api/board", [this](const Request& request) { return board(request); });
   get("/api/calibration", [this](const Request&) {
     return result_or_refusal(call("calibrate", {{"action", "look"}}, kTimeout));
   });
@@ -253,6 +257,7 @@ void PageServer::add_requests() {
     return result_or_refusal(call("project", {{"picture", *picture}}, kTimeout));
   });
   pass_on("/api/set", "set");
+  pass_on("/api/preset", "preset");
   pass_on("/api/calibrate", "calibrate");
   post("/api/login", true, [this](const Request& request, const json& body) { return log_in(request, body); });
 }
@@ -312,6 +317,28 @@ Answer PageServer::reasons(const Request& request) const {
   return json_answer({{"png", to_base64(answered->reply.bytes)}, {"reasons", about.value("reasons", json::array())}});
 }
 
+Answer PageServer::boards() const {
+  const auto boards = read_boards(options_.boards);
+  if (!boards) return refusal(404, "no_boards", to_string(boards.error()));
+  json result = json::array();
+  for (const PrintableBoard& board : *boards)
+    result.push_back({{"name", printable(board.name, 200)},
+                      {"board", board.board},
+                      {"width_mm", board.width_mm},
+                      {"height_mm", board.height_mm}});
+  return json_answer({{"boards", std::move(result)}});
+}
+
+Answer PageServer::board(const Request& request) const {
+  auto boards = read_boards(options_.boards);
+  if (!boards) return refusal(404, "no_boards", to_string(boards.error()));
+  const std::string name = parameter(request, "name");
+  for (PrintableBoard& board : *boards) {
+    if (board.name == name) return {200, "application/pdf", client::Bytes(std::move(board.pdf)), {}, {}};
+  }
+  return refusal(404, "not_found", "there is no such board: choose one of the list");
+}
+
 Answer PageServer::cloud(const Request& request) {
   const std::string density = parameter(request, "density"), text = parameter(request, "after");
   std::uint64_t after = 0;
@@ -329,7 +356,7 @@ Answer PageServer::cloud(const Request& request) {
 Answer PageServer::scan(const json& body) {
   json params{{"format", "ply"}, {"coordinate_frame", "rig"}, {"timeout_ms", 60'000}, {"transport", "memfd"}};
   for (const auto& [key, value] : body.items()) {
-    const bool known = key == "density" || key == "texture" || key == "ambient" || key == "normals";
+    const bool known = key == "density" || key == "texture" || key == "ambient" || key == "normals" || key == "preset";
     if (!known) return refusal(400, "invalid_params", "no such parameter: \"" + printable(key, 64) + "\"");
     params[key] = value;
   }

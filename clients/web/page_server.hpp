@@ -31,6 +31,7 @@ struct PageOptions {
   std::vector<std::string> names = {};                          ///< the page's host names, in addition to the address
   std::filesystem::path token_file = {};                        ///< empty: a random token for this run
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
+  std::filesystem::path boards = SLSD_BOARDS;                   ///< boards that are ready to print
 };
 
 /// Tells whether only this machine can reach the address.
@@ -77,6 +78,8 @@ class PageServer {
   [[nodiscard]] Answer status();
   [[nodiscard]] Answer image(const Request& request, const char* method) const;
   [[nodiscard]] Answer reasons(const Request& request) const;
+  [[nodiscard]] Answer boards() const;
+  [[nodiscard]] Answer board(const Request& request) const;
   [[nodiscard]] Answer cloud(const Request& request);
   [[nodiscard]] Answer scan(const nlohmann::json& body);
   [[nodiscard]] Answer past(const Request& request);

@@ -78,6 +78,22 @@ class Browser:
         element = self.ask("POST", self.session + "/element", {"using": "css selector", "value": selector})
         self.ask("POST", f"{self.session}/element/{next(iter(element.values()))}/click", {})
 
+    def click_at(self, selector, x, y):
+        """At so many pixels from the upper left corner of an element, as a hand does."""
+        left, top = self.run("""
+            const element = document.querySelector(arguments[0]);
+            element.scrollIntoView({block: "center"});
+            const place = element.getBoundingClientRect();
+            return [place.left, place.top];""", selector)
+        self.ask("POST", self.session + "/actions", {"actions": [
+            {"type": "pointer", "id": "mouse", "actions": [
+                {"type": "pointerMove", "duration": 0, "x": round(left + x), "y": round(top + y)},
+                {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]}]})
+
+    def key(self, key):
+        self.ask("POST", self.session + "/actions", {"actions": [
+            {"type": "key", "id": "keys", "actions": [{"type": "keyDown", "value": key}, {"type": "keyUp", "value": key}]}]})
+
     def devtools(self, command, **parameters):
         return self.ask("POST", self.session + "/goog/cdp/execute", {"cmd": command, "params": parameters})
 

@@ -44,10 +44,10 @@ class Door(unittest.TestCase):
             for stranger in ({}, {"X-Slsd-Page": "1"}, {"Authorization": "Bearer "}, {"Authorization": "Bearer " + "0" * 48},
                              {"Authorization": "Basic " + web.token}, {"Cookie": f"slsd_session_{web.port}="}):
                 for path in ("status", "frame", "preview", "reasons", "cloud?density=symbols&after=0", "past?scan=1", "metrics", "exposure",
-                             "calibration", "nothing"):
+                             "calibration", "presets", "boards", "board?name=a", "nothing"):
                     status, name = name_of(web.ask("GET", "/api/" + path, headers=stranger))
                     self.assertEqual((status, name in ("no_token", "wrong_token")), (401, True), (path, stranger))
-                for path in ("scan", "project", "set", "calibrate"):
+                for path in ("scan", "project", "set", "preset", "calibrate"):
                     status, name = name_of(web.ask("POST", "/api/" + path, "{}", headers=stranger))
                     self.assertEqual((status, name in ("no_token", "wrong_token")), (401, True), (path, stranger))
             self.assertEqual(name_of(web.get("/api/status", Origin="http://evil.example")), (403, "not_from_the_page"))

@@ -74,9 +74,16 @@ function showComplaints() {
   $("message").textContent = [...new Set(complaints.values())].join(" ");
 }
 
+// Whether a button may be pressed, apart from what it is doing now.
+function allow(button, may) {
+  button.dataset.may = may ? "yes" : "no";
+  button.disabled = !may || button.dataset.busy === "yes";
+}
+
 // Runs what a button asks for; its error is shown, and the button waits meanwhile.
 function onClick(button, action) {
   button.addEventListener("click", async () => {
+    button.dataset.busy = "yes";
     button.disabled = true;
     try {
       await action();
@@ -84,7 +91,8 @@ function onClick(button, action) {
     } catch (error) {
       say("button", error);
     }
-    button.disabled = false;
+    button.dataset.busy = "no";
+    button.disabled = button.dataset.may === "no";
   });
 }
 
@@ -134,7 +142,7 @@ function stateInWords({status}) {
   return ["good", "Ready to scan."];
 }
 
-let densityChosen = false;
+let densityChosen = false, mayAdminister = false;
 
 function showStatus(told) {
   const {status} = told;
@@ -143,7 +151,9 @@ function showStatus(told) {
     $("density").value = told.density;
     offerColours();
   }
-  $("calibrate-begin").disabled = !mayAdminister;
+  allow($("calibrate-begin"), mayAdminister);
+  showPresets();
+  allow($("expose"), mayAdminister);
   if (!mayAdminister) $("calibrate-next").textContent =
     "slsd-web may not administer this scanner; docs/page.md says how to allow it.";
   const [kind, words] = stateInWords(told);
@@ -211,47 +221,6 @@ async function followCamera() {
   }
 }
 
-let mayAdminister = false;
-
-// What the proposal would set; the gain only where it is to be another.
-function takeExposure(camera, {present, proposed}) {
-  const button = element("button", "Use this exposure");
-  button.id = "take-exposure";
-  onClick(button, async () => {
-    const set = {exposure_us: Math.round(proposed.exposure_us)};
-    if (Math.abs(proposed.gain_db - present.gain_db) > 0.05) set.gain_db = Math.round(10 * proposed.gain_db) / 10;
-    const told = await (await ask("api/set", {camera: {[camera]: set}})).json();
-    $("exposure").replaceChildren(element("p", `Set: ${Object.entries(set).map(([key, value]) => `${key} = ${value}`).join(", ")}.` +
-      (told.not_kept ? ` Not saved for the next start: ${told.not_kept}` : ""), "good"));
-    await takePicture();
-  });
-  return button;
-}
-
-async function proposeExposure() {
-  $("exposure").replaceChildren(element("p", "Taking two frames…"));
-  try {
-    const camera = $("which-camera").value;
-    const told = await (await ask("api/exposure?camera=" + encodeURIComponent(camera))).json();
-    const lines = [];
-    lines.push(element("p", told.patterned_share === 0 ? "The frame shows no pattern." :
-      `Symbols reach ${Math.round(told.lit)} of ${told.full}; the pattern covers ${Math.round(100 * told.patterned_share)} % ` +
-      `of the frame, ${Math.round(100 * told.clipped_share)} % of that is clipped.`));
-    if (told.proposed && told.present)
-      lines.push(element("p", `Set exposure_us = ${Math.round(told.proposed.exposure_us)} and a gain of ` +
-        `${told.proposed.gain_db.toFixed(1)} dB; now they are ${Math.round(told.present.exposure_us)} and ` +
-        `${told.present.gain_db.toFixed(1)} dB.`), takeExposure(camera, told));
-    else if (told.patterned_share > 0)
-      lines.push(element("p", told.brighter === 1 ? "The brightness is good as it is." :
-        `${told.brighter.toPrecision(2)} times as much light would be best.`));
-    for (const trouble of told.troubles) lines.push(element("p", trouble.remedy, "wait"));
-    $("exposure").replaceChildren(...lines);
-  } catch (error) {
-    $("exposure").replaceChildren();
-    throw error;
-  }
-}
-
 // A frame with the rule that rejected each region, and what to do about it.
 async function showReasons() {
   const told = await (await ask("api/reasons?camera=" + encodeURIComponent($("which-camera").value))).json();
@@ -314,8 +283,10 @@ function showScale() {
 }
 
 async function scan() {
-  const response = await ask("api/scan", {density: $("density").value});
+  const preset = presetOfScan();
+  const response = await ask("api/scan", {density: $("density").value, ...preset});
   showCloud(await response.arrayBuffer(), aboutOf(response));
+  if (preset.preset) await presetWasScanned();
 }
 
 async function followCloud() {
@@ -342,10 +313,10 @@ async function followCloud() {
   }
 }
 
-function save(blob, extension) {
+function saveAs(blob, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
-  link.download = `${shownScan.scan}.${extension}`;
+  link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
@@ -427,13 +398,13 @@ function begin() {
       await takePicture();
     });
   }
-  onClick($("propose"), proposeExposure);
+  beginExposure();
   onClick($("ask-reasons"), showReasons);
   onClick($("scan"), scan);
   onClick($("draw-again"), async () => view.drawAgain());
   onClick($("whole"), async () => view && view.frameAll());
-  onClick($("save-ply"), async () => save(new Blob([view.ply.buffer]), "ply"));
-  onClick($("save-pcd"), async () => save(new Blob(view.ply.pcd()), "pcd"));
+  onClick($("save-ply"), async () => saveAs(new Blob([view.ply.buffer]), shownScan.scan + ".ply"));
+  onClick($("save-pcd"), async () => saveAs(new Blob(view.ply.pcd()), shownScan.scan + ".pcd"));
   $("save-ply").disabled = $("save-pcd").disabled = true;
   for (const id of ["show-clipping", "show-sharpness"]) $(id).addEventListener("change", showPicture);
   $("cloud-live").addEventListener("change", () => say("cloud", null));
@@ -465,6 +436,9 @@ function begin() {
   followStatus();
   followCamera();
   beginCalibrating();
+  beginBoards();
+  beginPresets();
+  beginKeys();
   // What draws clouds is large, and would hold the picture up; a camera that is gone does not hold it up for long.
   Promise.race([pictured, pause(3000)]).then(prepareCloud);
 }

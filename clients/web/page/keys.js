@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+"use strict";
+
+// Keys, each for what a button does; and the view that takes the whole screen.
+const kViews = ["devices", "camera", "cloud", "calibrate", "history"];
+
+function press(id) {
+  if (!$(id).disabled) $(id).click();
+}
+
+function go(view) {
+  choose(view);
+  $(view).scrollIntoView();
+}
+
+const kKeys = [
+  ["s", "scan", () => press("scan")],
+  ["l", "live cloud on and off", () => press("cloud-live")],
+  ["v", "live picture on and off", () => press("camera-live")],
+  ["e", "set the best exposure", () => press("expose")],
+  ["m", "measuring on and off", () => press("measure")],
+  ["w", "show the whole cloud", () => press("whole")],
+  ["d", "download the cloud as PLY", () => press("save-ply")],
+  ["f", "cloud in full screen on and off", () => toggleFull("cloud")],
+  ["g", "picture in full screen on and off", () => toggleFull("camera")],
+  ...kViews.map((view, i) => [String(i + 1), `go to ${view}`, () => go(view)]),
+  ["?", "show these keys", () => toggleHelp()]];
+
+function toggleHelp() {
+  if ($("help").open) $("help").close();
+  else $("help").showModal();
+}
+
+// The whole page goes to full screen and shows one view, so that messages stay visible. Where the browser refuses full
+// screen, the view takes the window.
+let screenChanges = Promise.resolve(), leavesScreen = false;
+
+function toggleFull(view) {
+  showFull(document.body.dataset.full === view ? null : view);
+  screenChanges = screenChanges.then(followFull).catch(() => {});
+}
+
+async function followFull() {
+  const wanted = Boolean(document.body.dataset.full), root = document.documentElement;
+  if (wanted === Boolean(document.fullscreenElement) || !root.requestFullscreen) return;
+  leavesScreen = !wanted;
+  await (wanted ? root.requestFullscreen() : document.exitFullscreen());
+}
+
+function showFull(view) {
+  if (view) {
+    document.body.dataset.full = view;
+    choose(view);
+  } else {
+    delete document.body.dataset.full;
+  }
+  for (const button of document.querySelectorAll("[data-full-screen]"))
+    button.setAttribute("aria-pressed", String(button.dataset.fullScreen === view));
+}
+
+function onKey(event) {
+  if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing) return;
+  const writes = event.target.closest && event.target.closest("input:not([type=checkbox]), select, textarea");
+  if (writes || $("login").open || ($("help").open && event.key !== "?")) return;
+  if (event.key === "Escape" && document.body.dataset.full) return toggleFull(document.body.dataset.full);
+  const found = kKeys.find(([key]) => key === event.key);
+  if (!found) return;
+  event.preventDefault();
+  if (!event.repeat) found[2]();
+}
+
+function beginKeys() {
+  $("key-list").replaceChildren(...kKeys.map(([key, words]) => {
+    const row = element("tr", ""), cell = element("td", "");
+    cell.append(element("kbd", key));
+    row.append(cell, element("td", words));
+    return row;
+  }));
+  document.addEventListener("keydown", onKey);
+  document.addEventListener("fullscreenchange", () => {
+    if (!document.fullscreenElement && !leavesScreen) showFull(null);  // by the browser's own key
+    leavesScreen = false;
+  });
+  for (const button of document.querySelectorAll("[data-full-screen]"))
+    button.addEventListener("click", () => toggleFull(button.dataset.fullScreen));
+  $("show-help").addEventListener("click", toggleHelp);
+  $("close-help").addEventListener("click", toggleHelp);
+}
