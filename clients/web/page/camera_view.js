@@ -5,9 +5,10 @@
 const kClipped = 250;
 const kTile = 32;  // px: sharpness is judged for each
 
-// What a camera sees, as it is: to code and decode a picture takes longer than to send it.
-async function askFrame(camera) {
-  const response = await ask("api/frame?as_shown=1&format=raw&camera=" + encodeURIComponent(camera));
+// What a camera sees: to code and decode a picture takes longer than to send it.
+// @param as_shown  as it is; else the projector shows the pattern
+async function askFrame(camera, as_shown = true) {
+  const response = await ask(`api/frame?format=raw${as_shown ? "&as_shown=1" : ""}&camera=${encodeURIComponent(camera)}`);
   const {width_px: width, height_px: height, bits} = aboutOf(response);
   const bytes = new Uint8Array(await response.arrayBuffer());
   const grey = bits === 16 ? bytes.filter((_, i) => i % 2 === 1) : bytes;  // the upper half of each pixel

@@ -3,18 +3,18 @@
 "use strict";
 
 // The clouds as slsd writes them (docs/formats.md). Both readers give the same: a PLY, and how to make the organised PCD
-// of it. Clouds of symbols come as PLY, whose points say where on the lattice they are; clouds of pixels come as PCD when
+// of it; and as `cells` the record of the point in each cell of the organised cloud, -1 where there is none. Clouds of symbols come as PLY, whose points say where on the lattice they are; clouds of pixels come as PCD when
 // they are scanned, and as PLY, which does not say it, when they are live.
 
 function readCloud(buffer) {
   const begin = new TextDecoder("latin1").decode(new Uint8Array(buffer, 0, Math.min(6, buffer.byteLength)));
   if (begin.startsWith("# .PCD")) {
-    const ply = readPly(plyOfPixels(buffer));
-    return Object.assign(ply, {pcd: () => [buffer]});
+    const {plyBuffer, cells} = plyOfPixels(buffer);
+    return Object.assign(readPly(plyBuffer), {cells, pcd: () => [buffer]});
   }
   const ply = readPly(buffer);
   const onLattice = ply.fields.column && ply.fields.row && ply.comments.lattice_columns;
-  return Object.assign(ply, {pcd: onLattice ? () => pcdOfSymbols(ply) : null});
+  return Object.assign(ply, {cells: onLattice ? cellsOfSymbols(ply) : null, pcd: onLattice ? () => pcdOfSymbols(ply) : null});
 }
 
 const kSizes = {float: 4, uchar: 1, int: 4};
@@ -81,6 +81,21 @@ function pcdOfSymbols(ply) {
   return [header, cells];
 }
 
+// The lattices of the cameras one below the other.
+function cellsOfSymbols(ply) {
+  const columns = Number(ply.comments.lattice_columns), rows = Number(ply.comments.lattice_rows);
+  const from = new DataView(ply.buffer, ply.begin), {camera, column, row} = ply.fields;
+  let cameras = 1;
+  for (let i = 0; i < ply.count; ++i) cameras = Math.max(cameras, 1 + from.getUint8(i * ply.record + camera.offset));
+  const at = new Int32Array(cameras * rows * columns).fill(-1);
+  for (let i = 0, base = 0; i < ply.count; ++i, base += ply.record) {
+    const place = [from.getInt32(base + column.offset, true), from.getInt32(base + row.offset, true)];
+    if (place[0] < 0 || place[0] >= columns || place[1] < 0 || place[1] >= rows) continue;
+    at[(from.getUint8(base + camera.offset) * rows + place[1]) * columns + place[0]] = i;
+  }
+  return {columns, rows: cameras * rows, at, firstRow: Array.from({length: cameras}, (_, i) => i * rows)};
+}
+
 function get(view, at, type) {
   return type === "float" ? view.getFloat32(at, true) : type === "int" ? view.getInt32(at, true) : view.getUint8(at);
 }
@@ -91,7 +106,7 @@ function put(view, at, type, value) {
   else view.setUint8(at, value);
 }
 
-// The measured pixels of an organised PCD, as the PLY that slsd writes of the same cloud.
+// The measured pixels of an organised PCD, as the PLY that slsd writes of the same cloud; and where each of them is.
 function plyOfPixels(buffer) {
   const head = new TextDecoder("latin1").decode(new Uint8Array(buffer, 0, Math.min(4096, buffer.byteLength)));
   const end = head.indexOf("\nDATA binary\n");
@@ -110,13 +125,15 @@ function plyOfPixels(buffer) {
   if (buffer.byteLength < begin + count * record) throw new Error("the cloud is cut off");
   const from = new DataView(buffer, begin), records = new Uint8Array(count * recordInPly), to = new DataView(records.buffer);
   const z = fields.find(({name}) => name === "z"), camera = fields.find(({name}) => name === "camera");
+  const columns = Number(words("WIDTH")[0]), cells = new Int32Array(count).fill(-1), firstRow = [];
   let points = 0, cameras = 0;
-  for (let at = 0, end = count * record; at < end; at += record) {
-    cameras = Math.max(cameras, 1 + from.getUint8(at + camera.offset));
+  for (let at = 0, cell = 0, end = count * record; at < end; at += record, ++cell) {
+    const which = from.getUint8(at + camera.offset);
+    if (which >= cameras) [cameras, firstRow[which]] = [which + 1, Math.floor(cell / columns)];
     if (Number.isNaN(from.getFloat32(at + z.offset, true))) continue;
     for (const {type, offset, typeInPly, offsetInPly} of fields)
       put(to, points * recordInPly + offsetInPly, typeInPly, get(from, at + offset, type));
-    ++points;
+    cells[cell] = points++;
   }
   const header = new TextEncoder().encode(["ply", "format binary_little_endian 1.0",
     ...[...head.slice(0, end).matchAll(/^# (?!\.PCD)(.*)$/gm)].map(([, told]) => "comment " + told),
@@ -125,5 +142,5 @@ function plyOfPixels(buffer) {
   const ply = new Uint8Array(header.length + points * recordInPly);
   ply.set(header);
   ply.set(records.subarray(0, points * recordInPly), header.length);
-  return ply.buffer;
+  return {plyBuffer: ply.buffer, cells: {columns, rows: count / columns, at: cells, firstRow}};
 }

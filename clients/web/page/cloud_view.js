@@ -6,14 +6,25 @@
 // drawn while it turns.
 const kSpread = [0, 16, 8, 24, 4, 20, 12, 28, 2, 18, 10, 26, 6, 22, 14, 30, 1, 17, 9, 25, 5, 21, 13, 29, 3, 19, 11, 27, 7, 23, 15, 31];
 
-function column(ply, name) {
+// The record of the i-th point that is drawn.
+function recordOf(i, count) {
+  for (const first of kSpread) {
+    const many = Math.max(0, Math.ceil((count - first) / kSpread.length));
+    if (i < many) return first + i * kSpread.length;
+    i -= many;
+  }
+  return -1;
+}
+
+// @param spread  in the order in which they are drawn; else in that of the records
+function column(ply, name, spread = true) {
   const field = ply.fields[name];
   if (!field) return null;
-  const values = new Float32Array(ply.count), step = kSpread.length * ply.record;
+  const values = new Float32Array(ply.count), step = (spread ? kSpread.length : 1) * ply.record;
   const bytes = new Uint8Array(ply.buffer), view = new DataView(ply.buffer);
   const end = ply.begin + ply.count * ply.record;
   let i = 0;
-  for (const first of kSpread) {
+  for (const first of spread ? kSpread : [0]) {
     const begin = ply.begin + first * ply.record + field.offset;
     if (field.type === "uchar") for (let at = begin; at < end; at += step) values[i++] = bytes[at];
     else for (let at = begin; at < end; at += step) values[i++] = view.getFloat32(at, true);
@@ -37,32 +48,9 @@ function positions(ply) {
   return values;
 }
 
-// Where most of the values are: from so small a part of them to so large a one.
-function rangeOf(values) {
-  const step = Math.max(1, Math.floor(values.length / 20000));
-  const some = [];
-  for (let i = 0; i < values.length; i += step) some.push(values[i]);
-  some.sort((a, b) => a - b);
-  if (some.length === 0) return [0, 1];
-  const low = some[Math.floor(0.01 * (some.length - 1))], high = some[Math.ceil(0.99 * (some.length - 1))];
-  return high > low ? [low, high] : [low, low + 1];
-}
-
 // Colours are worked out once a cloud, not once a frame: without a graphics card each frame would pay for them.
-const kTurbo = [  // Mikhailov 2019, the polynomial approximation
-  [0.13572138, 4.61539260, -42.66032258, 132.13108234, -152.94239396, 59.28637943],
-  [0.09140261, 2.19418839, 4.84296658, -14.18503333, 4.27729857, 2.82956604],
-  [0.10667330, 12.64194608, -60.58204836, 110.36276771, -89.90310912, 27.34824973]];
-
 function coloursOf(values, [low, high], grey) {
-  const table = new Uint32Array(256);
-  const bytes = new Uint8ClampedArray(table.buffer);
-  for (let i = 0; i < 256; ++i) {
-    const x = 0.05 + 0.9 * i / 255;
-    for (let c = 0; c < 3; ++c)
-      bytes[4 * i + c] = 255 * (grey ? 0.08 + 0.92 * i / 255 : kTurbo[c].reduceRight((sum, factor) => sum * x + factor, 0));
-    bytes[4 * i + 3] = 255;
-  }
+  const table = colourTable(grey);
   const colours = new Uint32Array(values.length), scale = 255 / (high - low);
   for (let i = 0; i < values.length; ++i)
     colours[i] = table[Math.max(0, Math.min(255, Math.round((values[i] - low) * scale)))];
@@ -92,8 +80,8 @@ class CloudView {
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(40, 4 / 3, 1, 100000);
     this.marks = new THREE.Group();
+    this.marks.renderOrder = 1;
     this.scene.add(this.marks);
-    this.picked = [];
     this.ply = null;
     this.framed = false;
     this.colour = "z";
@@ -172,7 +160,6 @@ class CloudView {
     this.points.frustumCulled = false;
     this.scene.add(this.points);
     this.ply = ply;
-    this.clearMarks();
     this.drawnAt = -Infinity;  // a new cloud is drawn whole, however soon it comes
     this.paint();
     if (!this.framed && ply.count > 0) this.frameAll();
@@ -265,44 +252,36 @@ class CloudView {
     return best;
   }
 
-  point(index) {
-    const at = this.points.geometry.getAttribute("position").array.slice(3 * index, 3 * index + 3);
-    const sigma = column(this.ply, "sigma_mm"), camera = column(this.ply, "camera");
-    return {at: [at[0], -at[1], -at[2]], sigma: sigma ? sigma[index] : NaN, first: !camera || camera[index] === 0};
+  // The record of the point that is seen there, or -1.
+  recordAt(x, y) {
+    const index = this.points ? this.pick(x, y) : -1;
+    return index < 0 ? -1 : recordOf(index, this.ply.count);
   }
 
   clearMarks() {
-    this.picked = [];
-    for (const ball of [...this.marks.children]) {
-      this.marks.remove(ball);
-      ball.geometry.dispose();
-      ball.material.dispose();
+    for (const mark of [...this.marks.children]) {
+      this.marks.remove(mark);
+      mark.geometry.dispose();
+      mark.material.dispose();
     }
   }
 
-  // Marks a point; with the second of two, the distance between them and its standard deviation: each point is uncertain
-  // along its ray, and of that what points along the line between them counts. Rays of other cameras than the first do
-  // not come from the origin: theirs counts in full.
-  mark(x, y) {
-    const index = this.points ? this.pick(x, y) : -1;
-    if (index < 0) return null;
-    if (this.picked.length === 2) this.clearMarks();
-    this.picked.push(this.point(index));
-    const [px, py, pz] = this.picked[this.picked.length - 1].at;
-    const reach = this.camera.position.distanceTo(this.controls.target) / 120;
-    const ball = new THREE.Mesh(new THREE.SphereGeometry(reach, 12, 8), new THREE.MeshBasicMaterial({color: 0xffffff}));
-    ball.position.set(px, -py, -pz);
-    this.marks.add(ball);
+  // Each distance as a line between two balls, seen through the cloud.
+  drawDistances(measurements) {
+    this.clearMarks();
+    const onScreen = ({at: [x, y, z]}) => new THREE.Vector3(x, -y, -z);
+    const reach = this.camera.position.distanceTo(this.controls.target) / 150;
+    for (const point of measurements.points()) {
+      const ball = new THREE.Mesh(new THREE.SphereGeometry(reach, 12, 8), new THREE.MeshBasicMaterial({color: 0xffffff, depthTest: false}));
+      ball.position.copy(onScreen(point));
+      this.marks.add(ball);
+    }
+    for (const {a, b} of measurements.distances) {
+      const geometry = new THREE.BufferGeometry().setFromPoints([onScreen(a), onScreen(b)]);
+      const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({color: 0xffffff, depthTest: false}));
+      line.frustumCulled = false;
+      this.marks.add(line);
+    }
     this.draw();
-    if (this.picked.length < 2) return {points: 1};
-    const [a, b] = this.picked;
-    const between = a.at.map((value, axis) => b.at[axis] - value);
-    const distance = Math.hypot(...between);
-    const along = (point) => {
-      if (!point.first || distance === 0) return point.sigma;
-      const length = Math.hypot(...point.at);
-      return point.sigma * Math.abs(point.at.reduce((sum, value, axis) => sum + value * between[axis], 0)) / length / distance;
-    };
-    return {points: 2, distance, sigma: Math.hypot(along(a), along(b))};
   }
 }

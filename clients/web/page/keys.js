@@ -9,6 +9,11 @@ function press(id) {
   if (!$(id).disabled) $(id).click();
 }
 
+function nextShownAs() {
+  $("shown-as").selectedIndex = ($("shown-as").selectedIndex + 1) % $("shown-as").options.length;
+  $("shown-as").dispatchEvent(new Event("change"));
+}
+
 function go(view) {
   choose(view);
   $(view).scrollIntoView();
@@ -20,6 +25,8 @@ const kKeys = [
   ["v", "live picture on and off", () => press("camera-live")],
   ["e", "set the best exposure", () => press("expose")],
   ["m", "measuring on and off", () => press("measure")],
+  ["x", "clear the distances", () => press("clear-distances")],
+  ["t", "in space, or a map", () => nextShownAs()],
   ["w", "show the whole cloud", () => press("whole")],
   ["d", "download the cloud as PLY", () => press("save-ply")],
   ["f", "cloud in full screen on and off", () => toggleFull("cloud")],

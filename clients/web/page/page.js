@@ -96,6 +96,14 @@ function onClick(button, action) {
   });
 }
 
+function saveAs(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
+}
+
 // ---- devices ----
 
 const kStates = {
@@ -168,9 +176,14 @@ function showStatus(told) {
     `${failed} failed; decoding takes ${scans.decode_ms.mean.toFixed(1)} ms, ${scans.latency_ms.mean.toFixed(1)} ms to the ` +
     `client; ${countOf(status.clients, "client")}; ${(status.resident_bytes / 1048576).toFixed(0)} MiB.` +
     (scans.last_error ? ` Last error: ${scans.last_error.message}` : "");
+  cameraSizes = status.cameras.map(({width_px: width, height_px: height}) => ({width, height}));
   showCameras(status.cameras.map((camera) => camera.name));
   showPast(told.past);
 }
+
+let cameraSizes = [];
+
+const sizeOfCamera = (index) => cameraSizes[index];
 
 function showCameras(names) {
   const choice = $("which-camera");
@@ -235,98 +248,6 @@ async function showReasons() {
     return row;
   }));
   $("reasons").hidden = $("reasons-list").hidden = false;
-}
-
-// ---- cloud ----
-
-let view = null;
-let shownScan = null;
-
-function showCloud(buffer, about) {
-  const changed = shownScan && shownScan.density !== about.density;
-  shownScan = about;
-  if (changed || (view.ply && view.ply.count === 0)) view.framed = false;
-  view.show(readCloud(buffer));
-  offerColours();
-  showScale();
-  $("distance").textContent = "";
-  $("cloud-figures").textContent = `${about.points.toLocaleString("en")} points of scan ${about.scan}, ${about.time}` +
-    (about.decode_ms !== undefined ? `; decoded in ${about.decode_ms.toFixed(0)} ms` : "") +
-    (about.sigma_calibration_mm !== undefined ?
-      `; the calibration may shift the whole cloud by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "") +
-    (about.empty !== undefined ? `. No points: ${about.empty}` : "");
-  $("save-ply").disabled = false;
-  $("save-pcd").disabled = !view.ply.pcd;
-  $("save-hint").hidden = Boolean(view.ply.pcd);
-}
-
-// A cloud of pixels has no symbols; before there is a cloud, what would be scanned counts.
-function offerColours() {
-  const none = view && view.ply ? !view.ply.fields.symbol : $("density").value === "pixels";
-  const colour = $("colour");
-  colour.querySelector("[value=symbol]").disabled = none;
-  if (!none || colour.value !== "symbol") return;
-  colour.value = "z";
-  if (!view) return;
-  view.colour = "z";
-  view.paint();
-}
-
-const kColours = {z: "mm of depth", intensity: "of 255", sigma_mm: "mm of sigma", symbol: "number of the symbol"};
-
-function showScale() {
-  const [low, high] = view.range;
-  const digits = Math.max(0, Math.min(4, 2 - Math.floor(Math.log10(high - low))));
-  const [lowest, highest] = view.colour === "intensity" ? ["black", "white"] : ["blue", "red"];
-  $("scale").replaceChildren(element("span", `${lowest} ${low.toFixed(digits)}`), element("span", kColours[view.colour]),
-                             element("span", `${highest} ${high.toFixed(digits)}`));
-}
-
-async function scan() {
-  const preset = presetOfScan();
-  const response = await ask("api/scan", {density: $("density").value, ...preset});
-  showCloud(await response.arrayBuffer(), aboutOf(response));
-  if (preset.preset) await presetWasScanned();
-}
-
-async function followCloud() {
-  let after = 0, density = null;
-  for (;;) {
-    if (!$("cloud-live").checked || document.hidden) {
-      await pause(50);
-      continue;
-    }
-    if (density !== $("density").value) [density, after] = [$("density").value, 0];
-    try {
-      const response = await ask(`api/cloud?density=${density}&after=${after}`);
-      if (response.status === 204) continue;
-      const buffer = await response.arrayBuffer();
-      const about = aboutOf(response);
-      after = about.number;
-      if ($("cloud-live").checked && $("density").value === density) showCloud(buffer, about);
-      say("cloud", null);
-      await new Promise((done) => requestAnimationFrame(done));
-    } catch (error) {
-      say("cloud", error);
-      await pause(kRetryPause);
-    }
-  }
-}
-
-function saveAs(blob, name) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(blob);
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
-}
-
-function measureAt(event) {
-  const place = $("space").getBoundingClientRect();
-  const marked = view.mark(event.clientX - place.left, event.clientY - place.top);
-  $("distance").textContent = !marked ? "No point there." :
-    marked.points === 1 ? "Now click the second point." :
-    `${marked.distance.toFixed(2)} mm ± ${marked.sigma.toFixed(2)} mm (one standard deviation)`;
 }
 
 // ---- history ----
@@ -400,24 +321,7 @@ function begin() {
   }
   beginExposure();
   onClick($("ask-reasons"), showReasons);
-  onClick($("scan"), scan);
-  onClick($("draw-again"), async () => view.drawAgain());
-  onClick($("whole"), async () => view && view.frameAll());
-  onClick($("save-ply"), async () => saveAs(new Blob([view.ply.buffer]), shownScan.scan + ".ply"));
-  onClick($("save-pcd"), async () => saveAs(new Blob(view.ply.pcd()), shownScan.scan + ".pcd"));
-  $("save-ply").disabled = $("save-pcd").disabled = true;
   for (const id of ["show-clipping", "show-sharpness"]) $(id).addEventListener("change", showPicture);
-  $("cloud-live").addEventListener("change", () => say("cloud", null));
-  $("colour").addEventListener("change", () => {
-    if (view) view.colour = $("colour").value;
-    if (view && view.paint()) showScale();
-  });
-  let pressed = null;
-  $("space").addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
-  $("space").addEventListener("pointerup", (event) => {
-    const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
-    if (view && $("measure").checked && moved !== null && moved < 5) measureAt(event);
-  });
   $("login-form").addEventListener("submit", async (event) => {
     event.preventDefault();
     try {
@@ -427,11 +331,7 @@ function begin() {
       $("login-message").textContent = error.message;
     }
   });
-  $("density").addEventListener("change", () => {
-    densityChosen = true;
-    offerColours();
-  });
-  $("scan").disabled = $("cloud-live").disabled = true;  // until there is something to draw clouds with
+  beginCloud();
   const pictured = showPicture();
   followStatus();
   followCamera();
@@ -441,27 +341,6 @@ function begin() {
   beginKeys();
   // What draws clouds is large, and would hold the picture up; a camera that is gone does not hold it up for long.
   Promise.race([pictured, pause(3000)]).then(prepareCloud);
-}
-
-function load(script) {
-  return new Promise((done, failed) => {
-    const element = Object.assign(document.createElement("script"), {src: script, onload: done});
-    element.onerror = () => failed(new Error("three.js was not found on the scanner: install the package libjs-three."));
-    document.head.append(element);
-  });
-}
-
-// After the rest, as it is large: the picture and the states do not wait for it.
-async function prepareCloud() {
-  try {
-    await load("three.js");
-    await load("orbit_controls.js");
-    view = new CloudView($("space"), (lost) => { $("lost").hidden = !lost; });
-    $("scan").disabled = $("cloud-live").disabled = false;
-    followCloud();
-  } catch (error) {
-    $("cloud-figures").textContent = "Clouds cannot be drawn: " + error.message;
-  }
 }
 
 begin();

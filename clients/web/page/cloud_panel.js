@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// Copyright the slsd authors
+"use strict";
+
+// The view "Cloud": scans, live clouds, the cloud in space or as a map, what lies under the cursor, distances.
+let view = null, map = null, measurements = null;
+let shownScan = null;
+let clippedFrame = null;  // of the scan that is shown, once the map of clipping was asked for
+
+function showCloud(buffer, about) {
+  const changed = shownScan && shownScan.density !== about.density;
+  shownScan = about;
+  clippedFrame = null;
+  if (changed || (view.ply && view.ply.count === 0)) view.framed = false;
+  view.show(readCloud(buffer));
+  offerColours();
+  measurements.clear();  // which draws
+  $("under-cursor").textContent = "";
+  $("cloud-figures").textContent = `${about.points.toLocaleString("en")} points of scan ${about.scan}, ${about.time}` +
+    (about.decode_ms !== undefined ? `; decoded in ${about.decode_ms.toFixed(0)} ms` : "") +
+    (about.sigma_calibration_mm !== undefined ?
+      `; the calibration may shift the whole cloud by ${about.sigma_calibration_mm.toFixed(2)} mm (one standard deviation)` : "") +
+    (about.empty !== undefined ? `. No points: ${about.empty}` : "");
+  $("save-ply").disabled = false;
+  $("save-pcd").disabled = !view.ply.pcd;
+  $("save-hint").hidden = Boolean(view.ply.pcd);
+}
+
+// A cloud of pixels has no symbols; before there is a cloud, what would be scanned counts.
+function offerColours() {
+  const none = view && view.ply ? !view.ply.fields.symbol : $("density").value === "pixels";
+  const colour = $("colour");
+  colour.querySelector("[value=symbol]").disabled = none;
+  if (!none || colour.value !== "symbol") return;
+  colour.value = "z";
+  if (!view) return;
+  view.colour = "z";
+  view.paint();
+}
+
+const kUnits = {z: "mm of depth", intensity: "intensity, of 255", sigma_mm: "mm of sigma", symbol: "number of the symbol"};
+
+// ---- in space or as a map ----
+
+const isMap = () => $("shown-as").value !== "space";
+
+function drawShown() {
+  $("space").hidden = isMap();
+  $("map").hidden = !isMap();
+  $("colour").disabled = isMap();
+  if (!view || !view.ply) return;
+  if (!isMap()) {
+    view.drawDistances(measurements);
+    showColourBar($("scale"), view.range, view.colour === "intensity", kUnits[view.colour]);
+    return;
+  }
+  drawMap().then(() => say("map", null), (error) => say("map", error));
+}
+
+async function drawMap() {
+  const kind = $("shown-as").value, camera = Math.max(0, $("which-camera").selectedIndex);
+  if (kind === "clipping" && !clippedFrame) {
+    const scan = shownScan;
+    const frame = await askFrame($("which-camera").value, false);
+    if (scan !== shownScan || $("shown-as").value !== kind) return;
+    clippedFrame = frame;
+  }
+  const drawn = map.draw(view.ply, camera, sizeOfCamera(camera), kind, clippedFrame);
+  if (!drawn) {
+    $("shown-as").value = "space";
+    drawShown();
+    throw new Error("A live cloud of pixels does not say where its pixels are. Press Scan for a map.");
+  }
+  map.drawDistances(measurements);
+  if (drawn.range) showColourBar($("scale"), drawn.range, false, kUnits[kind]);
+  else $("scale").replaceChildren(element("span", `Red: at the sensor's limit, ${(100 * drawn.clipped).toFixed(2)} % of the frame`, "unit"));
+}
+
+// ---- under the cursor ----
+
+let wantedCursor = null;
+
+function placeIn(event) {
+  const place = event.currentTarget.getBoundingClientRect();
+  return [event.clientX - place.left, event.clientY - place.top];
+}
+
+// The record of the point that is shown there, or -1.
+function recordAt(x, y) {
+  if (!view || !view.ply) return -1;
+  return isMap() ? map.recordAt(map.pixelAt(x, y)) : view.recordAt(x, y);
+}
+
+const pointAt = (x, y) => {
+  const record = recordAt(x, y);
+  return record < 0 ? null : pointOf(view.ply, record);
+};
+
+function tellCursor() {
+  const [x, y] = wantedCursor;
+  wantedCursor = null;
+  if (!view || !view.ply) return;
+  const point = pointAt(x, y), pixel = isMap() ? `px ${map.pixelAt(x, y).join(", ")}: ` : "";
+  $("under-cursor").textContent = pixel + (point === null ? "no point here" :
+    `x ${point.at[0].toFixed(2)}  y ${point.at[1].toFixed(2)}  z ${point.at[2].toFixed(2)} mm ± ${point.sigma.toFixed(2)} mm`);
+}
+
+function followCursor(event) {
+  if (event.buttons) return;  // it turns the cloud
+  if (!wantedCursor) requestAnimationFrame(tellCursor);
+  wantedCursor = placeIn(event);
+}
+
+// ---- scans ----
+
+async function scan() {
+  const preset = presetOfScan();
+  const response = await ask("api/scan", {density: $("density").value, ...preset});
+  showCloud(await response.arrayBuffer(), aboutOf(response));
+  if (preset.preset) await presetWasScanned();
+}
+
+async function followCloud() {
+  let after = 0, density = null;
+  for (;;) {
+    if (!$("cloud-live").checked || document.hidden) {
+      await pause(50);
+      continue;
+    }
+    if (density !== $("density").value) [density, after] = [$("density").value, 0];
+    try {
+      const response = await ask(`api/cloud?density=${density}&after=${after}`);
+      if (response.status === 204) continue;
+      const buffer = await response.arrayBuffer();
+      const about = aboutOf(response);
+      after = about.number;
+      if ($("cloud-live").checked && $("density").value === density) showCloud(buffer, about);
+      say("cloud", null);
+      await new Promise((done) => requestAnimationFrame(done));
+    } catch (error) {
+      say("cloud", error);
+      await pause(kRetryPause);
+    }
+  }
+}
+
+// ---- the whole ----
+
+function beginCloud() {
+  onClick($("scan"), scan);
+  onClick($("draw-again"), async () => view.drawAgain());
+  onClick($("whole"), async () => view && view.frameAll());
+  onClick($("save-ply"), async () => saveAs(new Blob([view.ply.buffer]), shownScan.scan + ".ply"));
+  onClick($("save-pcd"), async () => saveAs(new Blob(view.ply.pcd()), shownScan.scan + ".pcd"));
+  onClick($("clear-distances"), async () => measurements.clear());
+  $("save-ply").disabled = $("save-pcd").disabled = true;
+  $("cloud-live").addEventListener("change", () => say("cloud", null));
+  $("colour").addEventListener("change", () => {
+    if (view) view.colour = $("colour").value;
+    if (view && view.paint()) drawShown();
+  });
+  for (const id of ["shown-as", "which-camera"]) $(id).addEventListener("change", drawShown);
+  $("density").addEventListener("change", () => {
+    densityChosen = true;
+    offerColours();
+  });
+  measurements = new Measurements($("distances"), $("distance"), () => view && view.ply && drawShown());
+  map = new MapView($("map"));
+  for (const place of [$("space"), $("map")]) beginPointing(place);
+  $("scan").disabled = $("cloud-live").disabled = true;  // until there is something to draw clouds with
+}
+
+function beginPointing(place) {
+  let pressed = null;
+  place.addEventListener("pointermove", followCursor);
+  place.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  place.addEventListener("pointerup", (event) => {
+    const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
+    if (view && $("measure").checked && moved !== null && moved < 5) measurements.add(pointAt(...placeIn(event)));
+  });
+}
+
+function load(script) {
+  return new Promise((done, failed) => {
+    const element = Object.assign(document.createElement("script"), {src: script, onload: done});
+    element.onerror = () => failed(new Error("three.js was not found on the scanner: install the package libjs-three."));
+    document.head.append(element);
+  });
+}
+
+// After the rest, as it is large: the picture and the states do not wait for it.
+async function prepareCloud() {
+  try {
+    await load("three.js");
+    await load("orbit_controls.js");
+    view = new CloudView($("space"), (lost) => { $("lost").hidden = !lost; });
+    $("scan").disabled = $("cloud-live").disabled = false;
+    followCloud();
+  } catch (error) {
+    $("cloud-figures").textContent = "Clouds cannot be drawn: " + error.message;
+  }
+}

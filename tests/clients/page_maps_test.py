@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""The page's maps, what it says of the point under the cursor, and its distances, against numpy on the service's own files."""
+import os
+import pathlib
+import re
+import tempfile
+import unittest
+
+import numpy as np
+
+from browser import Browser, is_there
+from page_service import Web
+from service import Service
+
+THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
+CAN_SCAN = "!document.getElementById('scan').disabled"
+NEAR, FAR = (252, 216, 104), (92, 84, 166)  # of picture/depth_colour.cpp
+
+
+def pixels_of(pcd):
+    """x, y, z, sigma of each pixel, row by row, by the header's own words."""
+    head, records = pcd.split(b"DATA binary\n", 1)
+    words = {line.split()[0]: line.split()[1:] for line in head.decode().splitlines() if not line.startswith("#") and line}
+    fields = np.dtype([(name, f"<{kind.lower()}{size}") for name, kind, size in zip(words["FIELDS"], words["TYPE"], words["SIZE"])])
+    return np.frombuffer(records, fields).reshape(int(words["HEIGHT"][0]), int(words["WIDTH"][0]))
+
+
+def symbols_of(ply):
+    head, records = ply.split(b"end_header\n", 1)
+    fields = [line.split()[1:] for line in head.decode().splitlines() if line.startswith("property")]
+    return np.frombuffer(records, [(name, {"float": "<f4", "uchar": "u1", "int": "<i4"}[kind]) for kind, name in fields])
+
+
+@unittest.skipUnless(is_there() and THREE.exists(), "no Chromium with its driver, or no three.js (./run deps)")
+class Maps(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(os.environ.get("SLSD_PICTURES") or tempfile.mkdtemp(prefix="slsd-test-"))
+
+    def choose(self, browser, name, value):
+        browser.run("const c = document.getElementById(arguments[0]); c.value = arguments[1];"
+                    "c.dispatchEvent(new Event('change'));", name, value)
+
+    def scan(self, browser, density):
+        self.choose(browser, "density", density)
+        browser.run("window.before = shownScan && shownScan.scan;")
+        browser.click("#scan")
+        browser.wait("shownScan && shownScan.scan !== window.before && !document.getElementById('scan').disabled", "no cloud")
+
+    def open(self, browser, web, width=1600, height=1300):
+        browser.resize(width, height)
+        browser.open(web.address)
+        browser.wait(CAN_SCAN, "nothing to draw clouds with")
+        browser.wait("document.getElementById('which-camera').value === 'camera'", "no camera")
+
+    def at_pixel(self, browser, kind, u, v, place="#map"):
+        """Moves or presses the mouse at a pixel of the map."""
+        browser.run("""
+            const [kind, u, v, name] = arguments, map = document.querySelector(name), place = map.getBoundingClientRect();
+            const where = {clientX: place.left + (u + 0.5) / map.width * place.width,
+                           clientY: place.top + (v + 0.5) / map.height * place.height, bubbles: true};
+            for (const each of kind) map.dispatchEvent(new PointerEvent(each, where));""", kind, u, v, place)
+
+    def read(self, browser, u, v):
+        browser.run("document.getElementById('under-cursor').textContent = '';")
+        self.at_pixel(browser, ["pointermove"], u, v)
+        return browser.wait("document.getElementById('under-cursor').textContent", "nothing under the cursor")
+
+    def numbers(self, text):
+        return [float(number) for number in re.findall(r"-?\d+\.\d+", text)]
+
+    def test_a_dense_map_says_what_the_file_has_at_each_pixel(self):
+        with Service() as service, Web(service) as web, Browser() as browser, service.client() as client:
+            service.wait_ready()
+            self.open(browser, web)
+            self.scan(browser, "pixels")
+            cloud = pixels_of(client.call("scan", format="pcd", density="pixels", timeout_ms=60000)[1])
+            measured = np.argwhere(~np.isnan(cloud["z"]))
+            empty = np.argwhere(np.isnan(cloud["z"]))
+            self.choose(browser, "shown-as", "z")
+            browser.wait("!document.getElementById('map').hidden && map.records", "no map")
+            self.assertEqual(browser.run("return [map.canvas.width, map.canvas.height];"), list(cloud.shape[::-1]))
+            for v, u in measured[:: len(measured) // 7].tolist():
+                text = self.read(browser, u, v)
+                point = cloud[v, u]
+                self.assertTrue(text.startswith(f"px {u}, {v}: x "), text)
+                np.testing.assert_allclose(self.numbers(text), [point["x"], point["y"], point["z"], point["sigma_mm"]], atol=0.006)
+            v, u = empty[len(empty) // 2].tolist()
+            self.assertEqual(self.read(browser, u, v), f"px {u}, {v}: no point here")
+            browser.picture(self.folder / "map-depth-1600.png")
+            self.check_colours(browser, cloud["z"])
+            self.choose(browser, "shown-as", "sigma_mm")
+            self.assertIn("mm of sigma", browser.run("return document.getElementById('scale').textContent;"))
+            self.check_colours(browser, cloud["sigma_mm"])
+            browser.picture(self.folder / "map-sigma-1600.png")
+            browser.resize(390, 844)
+            browser.click("nav [data-view=cloud]")
+            self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390)
+            self.assertEqual(browser.complaints(), [])
+
+    def check_colours(self, browser, values):
+        """The hundredth of the lowest is gold, that of the highest indigo, and what has no point is neither."""
+        drawn = browser.run("""
+            const {width, height} = map.canvas, data = map.canvas.getContext('2d').getImageData(0, 0, width, height).data;
+            return arguments[0].map(([v, u]) => [...data.slice(4 * (v * width + u), 4 * (v * width + u) + 3)]);""",
+                            [np.argwhere(values <= np.nanquantile(values, 0.005))[0].tolist(),
+                             np.argwhere(values >= np.nanquantile(values, 0.995))[0].tolist(), np.argwhere(np.isnan(values))[0].tolist()])
+        self.assertEqual(drawn, [list(NEAR), list(FAR), [0x22, 0x26, 0x2c]])
+
+    def test_a_symbol_fills_the_map_around_it_and_clipping_is_red(self):
+        with Service() as service, Web(service) as web, Browser() as browser, service.client() as client:
+            service.wait_ready()
+            self.open(browser, web)
+            self.scan(browser, "symbols")
+            self.choose(browser, "shown-as", "z")
+            browser.wait("map.records", "no map")
+            cloud = symbols_of(client.call("scan", format="ply")[1])
+            for point in cloud[:: len(cloud) // 5]:
+                u, v = round(float(point["camera_u"])), round(float(point["camera_v"]))
+                text = self.read(browser, u + 2, v - 2)
+                np.testing.assert_allclose(self.numbers(text)[:3], [point["x"], point["y"], point["z"]], atol=0.006)
+            self.choose(browser, "shown-as", "clipping")
+            browser.wait("/% of the frame/.test(document.getElementById('scale').textContent)", "no map of clipping")
+            self.assertEqual(browser.run("""
+                const frame = {width: 8, height: 2, grey: new Uint8Array(16).fill(100)};
+                frame.grey[3] = 255;
+                const part = map.drawClipping(frame).clipped, pixels = map.canvas.getContext('2d').getImageData(0, 0, 8, 2).data;
+                return [part, ...pixels.slice(12, 16), ...pixels.slice(16, 20)];"""), [1 / 16, 255, 0, 0, 255, 100, 100, 100, 255])
+
+    def test_a_live_cloud_of_pixels_has_no_map_and_the_page_says_so(self):
+        with Service() as service, Web(service) as web, Browser() as browser:
+            service.wait_ready()
+            self.open(browser, web)
+            self.choose(browser, "density", "pixels")
+            browser.click("#cloud-live")
+            browser.wait("view.ply && view.ply.count > 10000", "no live cloud")
+            browser.click("#cloud-live")
+            self.choose(browser, "shown-as", "z")
+            browser.wait("/Press Scan for a map/.test(document.getElementById('message').textContent)", "no message")
+            self.assertEqual(browser.run("return [document.getElementById('shown-as').value, document.getElementById('space').hidden];"),
+                             ["space", False])
+            self.scan(browser, "pixels")
+            self.choose(browser, "shown-as", "z")
+            browser.wait("map.records && document.getElementById('message').hidden", "the complaint stays")
+
+    def test_several_distances_agree_with_numpy_on_both_views(self):
+        with Service() as service, Web(service) as web, Browser() as browser, service.client() as client:
+            service.wait_ready()
+            self.open(browser, web)
+            self.scan(browser, "pixels")
+            cloud = pixels_of(client.call("scan", format="pcd", density="pixels", timeout_ms=60000)[1])
+            measured = np.argwhere(~np.isnan(cloud["z"]))
+            picks = measured[[len(measured) // 9 * i + 40 for i in range(1, 7)]].tolist()
+            self.choose(browser, "shown-as", "z")
+            browser.wait("map.records", "no map")
+            for v, u in picks:
+                self.at_pixel(browser, ["pointerdown", "pointerup"], u, v)
+            rows = browser.run("return [...document.querySelectorAll('#distances tbody tr')]"
+                               ".map((row) => [...row.querySelectorAll('td')].slice(0, 5).map((cell) => Number(cell.textContent)));")
+            self.assertEqual(len(rows), 3)
+            for row, (first, second) in zip(rows, zip(picks[::2], picks[1::2])):
+                a, b = (cloud[tuple(pick)] for pick in (first, second))
+                places = [np.array([p["x"], p["y"], p["z"]], float) for p in (a, b)]
+                between = places[1] - places[0]
+                along = [p["sigma_mm"] * abs(place @ between) / np.linalg.norm(place) / np.linalg.norm(between)
+                         for p, place in zip((a, b), places)]
+                np.testing.assert_allclose(row, [np.linalg.norm(between), np.hypot(*along), *between], atol=0.0051)
+            browser.picture(self.folder / "distances-map-1600.png")
+            self.choose(browser, "shown-as", "space")
+            lines = browser.run("return view.marks.children.filter((m) => m.isLine).map((m) => "
+                                "[...m.geometry.getAttribute('position').array]);")
+            np.testing.assert_allclose(np.linalg.norm(np.diff(np.reshape(lines, (3, 2, 3)), axis=1), axis=2).ravel(),
+                                       [row[0] for row in rows], atol=0.0051)
+            browser.picture(self.folder / "distances-space-1600.png")
+            browser.click("#distances tbody tr:nth-child(2) button")
+            self.assertEqual(browser.run("return [measurements.distances.length, view.marks.children.length];"), [2, 6])
+            browser.resize(390, 844)
+            browser.click("nav [data-view=cloud]")
+            self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390)
+            browser.picture(self.folder / "distances-390.png")
+            browser.key("x")
+            self.assertEqual(browser.run("return [measurements.distances.length, view.marks.children.length, "
+                                         "document.getElementById('distances').hidden];"), [0, 0, True])
+            self.scan(browser, "symbols")  # a point in space is the one whose record it names
+            browser.resize(1600, 1300)
+            same = browser.run("""
+                const at = view.points.geometry.getAttribute('position').array;
+                return [0, 1, 700, 1900, view.ply.count - 1].map((i) => {
+                  const [x, y, z] = pointOf(view.ply, recordOf(i, view.ply.count)).at;
+                  return x === at[3 * i] && y === -at[3 * i + 1] && z === -at[3 * i + 2];
+                });""")
+            self.assertEqual(same, [True] * 5)
+            self.assertEqual(browser.complaints(), [])
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
