@@ -3,7 +3,7 @@
 "use strict";
 
 // The view "Cloud": scans, live clouds, the cloud in space or as a map, what lies under the cursor, distances.
-let view = null, map = null, measurements = null;
+let view = null, map = null, measurements = null, overlay = null;
 let shownScan = null;
 let clippedFrame = null;  // of the scan that is shown, once the map of clipping was asked for
 
@@ -12,7 +12,11 @@ function showCloud(buffer, about) {
   shownScan = about;
   clippedFrame = null;
   if (changed || (view.ply && view.ply.count === 0)) view.framed = false;
-  view.show(readCloud(buffer));
+  const ply = readCloud(buffer);
+  offerDepths(ply);
+  view.show(ply);
+  overlay.box = boxOf(ply);
+  view.drawBox(overlay.box);
   offerColours();
   measurements.clear();  // which draws
   $("under-cursor").textContent = "";
@@ -45,9 +49,9 @@ const kUnits = {z: "mm of depth", intensity: "intensity, of 255", sigma_mm: "mm 
 const isMap = () => $("shown-as").value !== "space";
 
 function drawShown() {
-  $("space").hidden = isMap();
+  $("space").hidden = $("space-overlay").hidden = isMap();
   $("map").hidden = !isMap();
-  $("colour").disabled = isMap();
+  $("colour").disabled = $("shaded").disabled = isMap();
   if (!view || !view.ply) return;
   if (!isMap()) {
     view.drawDistances(measurements);
@@ -65,7 +69,7 @@ async function drawMap() {
     if (scan !== shownScan || $("shown-as").value !== kind) return;
     clippedFrame = frame;
   }
-  const drawn = map.draw(view.ply, camera, sizeOfCamera(camera), kind, clippedFrame);
+  const drawn = map.draw(view.ply, camera, sizeOfCamera(camera), kind, clippedFrame, depthLimits);
   if (!drawn) {
     $("shown-as").value = "space";
     drawShown();
@@ -115,8 +119,9 @@ function followCursor(event) {
 
 async function scan() {
   const preset = presetOfScan();
-  const response = await ask("api/scan", {density: $("density").value, ...preset});
-  showCloud(await response.arrayBuffer(), aboutOf(response));
+  const density = $("density").value;
+  const {buffer, about} = await askWithProgress("api/scan", {density, ...preset}, density);
+  showCloud(buffer, about);
   if (preset.preset) await presetWasScanned();
 }
 
@@ -159,6 +164,11 @@ function beginCloud() {
     if (view) view.colour = $("colour").value;
     if (view && view.paint()) drawShown();
   });
+  $("shaded").addEventListener("change", () => {
+    if (view) view.shaded = $("shaded").checked;
+    if (view && view.paint()) drawShown();
+  });
+  beginDepthRange();
   for (const id of ["shown-as", "which-camera"]) $(id).addEventListener("change", drawShown);
   $("density").addEventListener("change", () => {
     densityChosen = true;
@@ -194,6 +204,10 @@ async function prepareCloud() {
     await load("three.js");
     await load("orbit_controls.js");
     view = new CloudView($("space"), (lost) => { $("lost").hidden = !lost; });
+    overlay = new SpaceOverlay($("space-overlay"), view);
+    overlay.measurements = measurements;
+    view.onDrawn = () => overlay.draw();
+    new ResizeObserver(() => overlay.resize()).observe($("space"));
     $("scan").disabled = $("cloud-live").disabled = false;
     followCloud();
   } catch (error) {

@@ -49,24 +49,44 @@ function positions(ply) {
 }
 
 // Colours are worked out once a cloud, not once a frame: without a graphics card each frame would pay for them.
-function coloursOf(values, [low, high], grey) {
+// @param shade   of shadeOf(), or null
+// @param hidden  whether a value of `depths` is left out: no colour
+function coloursOf(values, [low, high], grey, shade, depths, hidden) {
   const table = colourTable(grey);
   const colours = new Uint32Array(values.length), scale = 255 / (high - low);
   for (let i = 0; i < values.length; ++i)
     colours[i] = table[Math.max(0, Math.min(255, Math.round((values[i] - low) * scale)))];
+  const bytes = new Uint8ClampedArray(colours.buffer);
+  if (shade) {
+    let at = 0;
+    for (const first of kSpread) {
+      for (let record = first; record < values.length; record += kSpread.length, at += 4) {
+        const bright = shade.bright[record] / 255 * kFullLight, gloss = shade.gloss[record];
+        for (let c = at; c < at + 3; ++c) bytes[c] = bytes[c] * bright + gloss;
+      }
+    }
+  }
+  if (hidden) for (let i = 0; i < values.length; ++i) if (hidden(depths[i])) colours[i] = 0;
   return new Uint8Array(colours.buffer);
 }
 
 const kVertexShader = `
 attribute vec4 colour;
-uniform float size;
-varying vec3 tint;
+uniform float least, most, pitch;
+varying vec4 tint;
 void main() {
-  tint = colour.rgb;
+  tint = colour;
   gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
-  gl_PointSize = size;
+  gl_PointSize = clamp(pitch * -position.z / gl_Position.w, least, most);
 }`;
-const kFragmentShader = "varying vec3 tint; void main() { gl_FragColor = vec4(tint, 1.0); }";
+const kFragmentShader = `
+varying vec4 tint;
+void main() {
+  if (tint.a < 0.5) discard;
+  gl_FragColor = vec4(tint.rgb, 1.0);
+}`;
+const kFill = {symbols: 0.8, pixels: 1.5};    // of the gap to the neighbours
+const kLargest = {symbols: 22, pixels: 16};  // px
 
 const kBackground = 0x16181c;
 const kTurn = 1500, kSlowest = 110, kAim = 80, kFastest = 50, kRest = 300, kPace = 500;  // ms between two frames
@@ -85,6 +105,9 @@ class CloudView {
     this.ply = null;
     this.framed = false;
     this.colour = "z";
+    this.shaded = true;
+    this.limits = null;  // of depth, mm: what lies outside is not shown
+    this.onDrawn = () => {};
     this.drawn = 0;
     this.range = [0, 1];
     this.part = 1;  // of the points, what is drawn while it turns
@@ -99,7 +122,7 @@ class CloudView {
   makeCanvas() {
     this.lost = false;
     this.material = new THREE.ShaderMaterial({
-      uniforms: {size: {value: 2}},
+      uniforms: {least: {value: 2}, most: {value: 2}, pitch: {value: 0}},
       vertexShader: kVertexShader, fragmentShader: kFragmentShader});
     this.renderer = new THREE.WebGLRenderer({antialias: false, preserveDrawingBuffer: false});
     const canvas = this.renderer.domElement;
@@ -143,6 +166,7 @@ class CloudView {
     if (width === 0 || height === 0) return;  // another view is chosen
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.renderer.setSize(width, height);
+    if (this.ply) this.setSizes();
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
     this.drawnAt = -Infinity;
@@ -169,20 +193,37 @@ class CloudView {
   // By a column of the cloud; by depth where it has no such column.
   paint() {
     if (!this.ply) return null;
-    const values = column(this.ply, this.colour) || column(this.ply, "z");
-    const grey = this.colour === "intensity";
-    this.range = grey ? [0, 255] : rangeOf(values);
-    const colours = coloursOf(values, this.range, grey);
+    const depths = column(this.ply, "z"), values = column(this.ply, this.colour) || depths;
+    const grey = this.colour === "intensity", [near, far] = this.limits || [-Infinity, Infinity];
+    this.range = grey ? [0, 255] : this.colour === "z" && this.limits ? this.limits : rangeOf(values);
+    const colours = coloursOf(values, this.range, grey, this.shaded && !grey ? this.shade() : null, depths,
+                              this.limits && ((z) => z < near || z > far));
     this.points.geometry.setAttribute("colour", new THREE.BufferAttribute(colours, 4, true));
-    this.material.uniforms.size.value = this.ply.count > 50000 ? 2 : 4;
+    this.setSizes();
     this.draw();
     return this.range;
+  }
+
+  // Worked out when it is first asked for.
+  shade() {
+    if (this.ply.shade === undefined) this.ply.shade = shadeOf(this.ply);
+    return this.ply.shade;
+  }
+
+  // A point is as large as the gap to its neighbours, whatever the zoom.
+  setSizes() {
+    if (this.ply.pitch === undefined) this.ply.pitch = pitchOf(this.ply);
+    const kind = this.ply.fields.symbol ? "symbols" : "pixels", {least, most, pitch} = this.material.uniforms;
+    const pxPerShare = this.renderer.domElement.height / 2 / Math.tan(this.camera.fov / 2 * Math.PI / 180);
+    least.value = this.ply.count > 50000 ? 2 : 4;
+    most.value = Math.max(least.value, kLargest[kind]);
+    pitch.value = kFill[kind] * this.ply.pitch * pxPerShare;
   }
 
   frameAll() {
     if (!this.ply || this.ply.count === 0) return;
     const at = this.points.geometry.getAttribute("position").array;
-    const axes = [0, 1, 2].map((axis) => rangeOf(at.filter((_, i) => i % 3 === axis)));
+    const axes = [0, 1, 2].map((axis) => rangeOf(at, axis, 3));
     const centre = axes.map(([low, high]) => (low + high) / 2);
     const [wide, high, deep] = axes.map(([low, high]) => 1.1 * (high - low) / 2);
     this.controls.target.set(...centre);
@@ -215,6 +256,7 @@ class CloudView {
     this.drawnAt = now;
     if (this.points) this.points.geometry.setDrawRange(0, turns ? Math.max(kFew, Math.ceil(this.part * this.ply.count)) : Infinity);
     this.renderer.render(this.scene, this.camera);
+    this.onDrawn();
     ++this.drawn;
     clearTimeout(this.rest);
     if (turns && this.part < 1) this.rest = setTimeout(() => {
@@ -239,8 +281,10 @@ class CloudView {
     const at = this.points.geometry.getAttribute("position").array;
     const matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
     const m = matrix.elements, width = this.place.clientWidth, height = this.place.clientHeight;
+    const [near, far] = this.limits || [-Infinity, Infinity];
     let best = -1, bestCost = Infinity;
     for (let i = 0, p = 0; p < at.length; ++i, p += 3) {
+      if (-at[p + 2] < near || -at[p + 2] > far) continue;
       const w = m[3] * at[p] + m[7] * at[p + 1] + m[11] * at[p + 2] + m[15];
       if (w <= 0) continue;
       const u = (m[0] * at[p] + m[4] * at[p + 1] + m[8] * at[p + 2] + m[12]) / w;
@@ -256,6 +300,22 @@ class CloudView {
   recordAt(x, y) {
     const index = this.points ? this.pick(x, y) : -1;
     return index < 0 ? -1 : recordOf(index, this.ply.count);
+  }
+
+  // The edges of a box in the rig's frame, or none.
+  drawBox(box) {
+    if (this.boxLines) {
+      this.scene.remove(this.boxLines);
+      this.boxLines.geometry.dispose();
+      this.boxLines.material.dispose();
+      this.boxLines = null;
+    }
+    if (!box) return;
+    const corners = edgesOf(box).flatMap(({ends}) => ends.map(([x, y, z]) => new THREE.Vector3(x, -y, -z)));
+    this.boxLines = new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(corners),
+                                           new THREE.LineBasicMaterial({color: 0x5f6670}));
+    this.boxLines.frustumCulled = false;
+    this.scene.add(this.boxLines);
   }
 
   clearMarks() {

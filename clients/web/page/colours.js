@@ -21,11 +21,11 @@ function colourTable(grey) {
   return table;
 }
 
-// Where most of the values are: from so small a part of them to so large a one.
-function rangeOf(values) {
-  const step = Math.max(1, Math.floor(values.length / 20000));
+// Where most of the values are: from so small a part of them to so large a one. @param first, stride  which of them
+function rangeOf(values, first = 0, stride = 1) {
+  const step = stride * Math.max(1, Math.floor(values.length / stride / 20000));
   const some = [];
-  for (let i = 0; i < values.length; i += step) if (!Number.isNaN(values[i])) some.push(values[i]);
+  for (let i = first; i < values.length; i += step) if (!Number.isNaN(values[i])) some.push(values[i]);
   some.sort((a, b) => a - b);
   if (some.length === 0) return [0, 1];
   const low = some[Math.floor(0.01 * (some.length - 1))], high = some[Math.ceil(0.99 * (some.length - 1))];

@@ -1,0 +1,227 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+# Copyright the slsd authors
+"""The cloud in space: its light against the service's own normals, its axes and scale, the depths that are shown, and how far a
+scan is."""
+import os
+import pathlib
+import tempfile
+import unittest
+
+import numpy as np
+
+from browser import Browser, is_there
+from page_service import Web
+from service import Service
+
+THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
+BUST = pathlib.Path(__file__).resolve().parents[1] / "corpus" / "8px-6-bust"
+CONFIGURATION = f"""
+[pattern]
+file = "{BUST}/pattern.toml"
+[[camera]]
+name = "camera"
+driver = "file"
+path = "{BUST}/frame.png"
+[calibration]
+file = "{BUST}/calibration.yml"
+[scan]
+timeout_ms = 60000
+[server]
+socket = "slsd.sock"
+"""
+CAN_SCAN = "!document.getElementById('scan').disabled"
+# The share of the view's middle that shows the background.
+GAPS = """
+view.render(performance.now());
+const gl = view.renderer.getContext(), [w, h] = [gl.drawingBufferWidth, gl.drawingBufferHeight], all = new Uint8Array(4 * w * h);
+gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, all);
+let gaps = 0, looked = 0;
+for (let y = Math.floor(0.3 * h); y < 0.7 * h; ++y) {
+  for (let x = Math.floor(0.3 * w); x < 0.7 * w; ++x, ++looked) {
+    const i = 4 * (y * w + x);
+    gaps += all[i] === 0x16 && all[i + 1] === 0x18 && all[i + 2] === 0x1c;
+  }
+}
+return gaps / looked;"""
+
+
+def points_of(pcd):
+    """The measured pixels, row by row."""
+    head, records = pcd.split(b"DATA binary\n", 1)
+    words = {line.split()[0]: line.split()[1:] for line in head.decode().splitlines() if not line.startswith("#") and line}
+    fields = np.dtype([(name, f"<{kind.lower()}{size}") for name, kind, size in zip(words["FIELDS"], words["TYPE"], words["SIZE"])])
+    cloud = np.frombuffer(records, fields)
+    return cloud[~np.isnan(cloud["z"])]
+
+
+def lit(normals):
+    """As --cloud-picture has it: picture/cloud/relief.cpp."""
+    light = np.array([-0.30, -0.62, -0.72]) / np.linalg.norm([-0.30, -0.62, -0.72])
+    return 0.42 + 0.66 * np.maximum(0, normals @ light)
+
+
+@unittest.skipUnless(is_there() and THREE.exists(), "no Chromium with its driver, or no three.js (./run deps)")
+class Space(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(os.environ.get("SLSD_PICTURES") or tempfile.mkdtemp(prefix="slsd-test-"))
+        self.service = self.enterContext(Service(configuration=CONFIGURATION))
+        self.web = self.enterContext(Web(self.service))
+        self.browser = self.enterContext(Browser())
+        self.service.wait_ready()
+
+    def open(self, width=1600, height=1300, scheme="light"):
+        self.browser.resize(width, height)
+        self.browser.devtools("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        self.browser.open(self.web.address)
+        self.browser.wait(CAN_SCAN, "nothing to draw clouds with")
+        if width < 1100:
+            self.browser.click("nav [data-view=cloud]")
+
+    def choose(self, name, value, event="change"):
+        self.browser.run("const c = document.getElementById(arguments[0]); c.value = arguments[1];"
+                         "c.dispatchEvent(new Event(arguments[2]));", name, value, event)
+
+    def scan(self, density):
+        self.choose("density", density)
+        self.browser.run("window.before = shownScan && shownScan.scan;")
+        self.browser.click("#scan")
+        self.browser.wait("shownScan && shownScan.scan !== window.before && !document.getElementById('scan').disabled", "no cloud")
+
+    def turn(self, around_x, around_y, nearer=1.0):
+        self.browser.run("""
+            const [x, y, nearer] = arguments, target = view.controls.target, from = view.camera.position.clone().sub(target);
+            from.applyAxisAngle(new THREE.Vector3(0, 1, 0), y).applyAxisAngle(new THREE.Vector3(1, 0, 0), x).multiplyScalar(nearer);
+            view.camera.position.copy(from.add(target));
+            view.controls.update();
+            view.drawnAt = -Infinity;
+            view.render(performance.now());""", around_x, around_y, nearer)
+
+    def test_the_light_is_that_of_the_services_own_normals(self):
+        with self.service.client() as client:
+            self.open()
+            self.scan("pixels")
+            points = points_of(client.call("scan", format="pcd", density="pixels", normals=True, timeout_ms=60000)[1])
+            count = self.browser.run("return view.ply.count;")
+            self.assertEqual(len(points), count)
+            normals = np.stack([points[f"normal_{axis}"] for axis in "xyz"], 1)
+            bright = np.array(self.browser.run("return [...view.ply.shade.bright];"), float) / 255 * 1.08
+            known = ~np.isnan(normals[:, 0])
+            off = np.abs(bright - lit(normals))[known]
+            print(f"brightness off that of the service's normals: median {np.median(off):.3f}, 90 % within {np.quantile(off, 0.9):.3f}")
+            self.assertLess(np.median(off), 0.02)
+            self.assertLess(np.quantile(off, 0.9), 0.1)
+            self.assertGreater(np.corrcoef(bright[known], lit(normals)[known])[0, 1], 0.9)
+            plain = "view.shaded = arguments[0]; view.paint(); return [...view.points.geometry.getAttribute('colour').array.slice(0, 4000)];"
+            shaded, flat = self.browser.run(plain, True), self.browser.run(plain, False)
+            self.assertNotEqual(shaded, flat)
+            stops = [(252, 216, 104), (204, 212, 102), (124, 198, 126), (64, 174, 152), (52, 146, 176), (72, 116, 182), (92, 84, 166)]
+            low, high = self.browser.run("return view.range;")
+            depths = np.array(self.browser.run("return [...column(view.ply, 'z').slice(0, 1000)];"))
+            shares = np.rint(255 * np.clip((depths - low) / (high - low), 0, 1)) / 255
+            expected = np.stack([np.interp(6 * shares, range(7), [stop[c] for stop in stops]) for c in range(3)], 1)
+            np.testing.assert_allclose(np.reshape(flat, (-1, 4))[:, :3], expected, atol=1.01)
+
+    def test_axes_and_scale_are_true(self):
+        for width, height, scheme in ((1600, 1300, "light"), (1280, 900, "dark"), (390, 844, "dark")):
+            self.open(width, height, scheme)
+            self.scan("pixels")
+            self.assertEqual(self.browser.run("return view.boxLines.geometry.getAttribute('position').count;"), 24)
+            self.turn(-0.35, -0.5)
+            texts = self.browser.run("""
+                const texts = [], write = overlay.write;
+                overlay.write = (context, text, x, y) => texts.push([text, x, y]);
+                overlay.draw();
+                overlay.write = write;
+                overlay.draw();
+                return texts;""")
+            names = [text for text, _, _ in texts]
+            for axis in "xyz":
+                self.assertIn(f"{axis} mm", names)
+            self.assertGreaterEqual(len(names), 3 + 1 + 6)
+            # A bar of its length amid the view, across the line of sight, is as long on the screen.
+            mm, px, seen = self.browser.run("""
+                const across = new THREE.Vector3(1, 0, 0).applyQuaternion(view.camera.quaternion), target = view.controls.target;
+                const ends = [-0.5, 0.5].map((share) => {
+                  const p = across.clone().multiplyScalar(share * overlay.bar.mm).add(target);
+                  return overlay.onScreen([p.x, -p.y, -p.z]);
+                });
+                return [overlay.bar.mm, overlay.bar.px, Math.hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1])];""")
+            self.assertAlmostEqual(px, seen, delta=0.01 * px)
+            self.assertIn(f"{mm} mm", names)
+            self.browser.picture(self.folder / f"space-{scheme}-{width}.png")
+            self.assertLessEqual(self.browser.run("return document.documentElement.scrollWidth;"), width)
+            self.browser.click("#whole")
+            self.assertEqual(self.browser.complaints(), [])
+
+    def test_a_surface_has_no_gaps_at_any_zoom(self):
+        """A wall without holes."""
+        with Service() as service, Web(service) as web:
+            service.wait_ready()
+            self.web = web
+            self.open()
+            self.scan("pixels")
+            for nearer in (1, 0.4, 0.4):
+                self.turn(0.1, 0.2, nearer)
+                self.browser.picture(self.folder / f"gaps-{nearer}.png")
+                self.assertLess(self.browser.run(GAPS), 0.002, nearer)
+
+    def test_only_chosen_depths_are_shown_and_picked(self):
+        self.open()
+        self.scan("pixels")
+        hidden = """
+            const colours = view.points.geometry.getAttribute('colour').array, depths = column(view.ply, 'z');
+            const [near, far] = depthLimits || [-Infinity, Infinity];
+            let wrong = 0, out = 0;
+            for (let i = 0; i < depths.length; ++i) {
+              const is_out = depths[i] < near || depths[i] > far;
+              out += is_out;
+              wrong += (colours[4 * i + 3] === 0) !== is_out;
+            }
+            return [wrong, out > 0.2 * depths.length, out < 0.99 * depths.length];"""
+        self.assertEqual(self.browser.run(hidden), [0, False, True])
+        self.choose("far", 500, "input")
+        self.assertEqual(self.browser.run(hidden), [0, True, True])
+        self.assertEqual(self.browser.run("return view.range[1] === depthLimits[1];"), True)
+        picked = self.browser.run("""
+            const {clientWidth: w, clientHeight: h} = view.place, found = [];
+            for (let x = 0; x < w; x += 40) for (let y = 0; y < h; y += 40) found.push(view.recordAt(x, y));
+            return found.filter((r) => r >= 0).map((r) => pointOf(view.ply, r).at[2] <= depthLimits[1]);""")
+        self.assertEqual((len(picked) > 3, all(picked)), (True, True))
+        self.choose("shown-as", "z")
+        self.browser.wait("map.records", "no map")
+        self.assertGreater(self.browser.run("""
+            const {width, height} = map.canvas, p = new Uint32Array(map.canvas.getContext('2d').getImageData(0, 0, width, height).data.buffer);
+            return p.filter((value, i) => value === kNoPoint && map.records.at[i] >= 0).length;"""), 1000)
+        self.choose("near", 700, "input")  # beyond the far one, which makes room
+        self.assertEqual(self.browser.run("return depthLimits[0] < depthLimits[1];"), True)
+        self.browser.click("#all-depths")
+        self.assertEqual(self.browser.run(hidden), [0, False, True])
+        self.assertEqual(self.browser.complaints(), [])
+
+    def test_a_scan_says_how_far_it_is(self):
+        self.open()
+        self.browser.run("""
+            window.told = [];
+            new MutationObserver(() => told.push([document.getElementById('progress-text').textContent,
+                                                  document.getElementById('progress-bar').getAttribute('value')]))
+              .observe(document.getElementById('progress'), {childList: true, characterData: true, subtree: true, attributes: true});""")
+        self.scan("pixels")
+        first = self.browser.run("return told.splice(0);")
+        self.assertTrue(first[0][0].startswith("Scanning: 0.0 s"), first)
+        self.assertIsNone(first[0][1])  # nothing is known of the time yet
+        received = [(text, float(share)) for text, share in first if text.startswith("Receiving") and share]
+        self.assertRegex(received[-1][0], r"^Receiving: (\d+\.\d) of \1 MB$")
+        self.assertEqual(received[-1][1], 1)
+        self.scan("pixels")
+        second = self.browser.run("return told.splice(0);")
+        self.assertRegex(second[0][0], r"of about \d+\.\d s")
+        self.browser.wait("document.getElementById('progress').hidden", "it stays")
+        self.service.stop()
+        self.browser.click("#scan")
+        self.browser.wait("!document.getElementById('message').hidden", "no message")
+        self.browser.wait("document.getElementById('progress').hidden", "it stays after an error")
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
