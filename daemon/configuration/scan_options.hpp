@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 
 #include "core/result.hpp"
@@ -20,6 +21,11 @@ struct ScanOptions {
   int power_line_hz = 0;              ///< 50 or 60: mains frequency of the flickering lamps around; 0: none, or unknown
 
   [[nodiscard]] std::chrono::milliseconds timeout() const { return std::chrono::milliseconds(timeout_ms); }
+  /// The time in which each camera adopts another exposure or gain: as long as a scan may wait, and enough to reopen
+  /// it.
+  [[nodiscard]] std::chrono::milliseconds camera_settings_time() const {
+    return std::max<std::chrono::milliseconds>(timeout(), std::chrono::seconds(20));
+  }
   [[nodiscard]] std::chrono::microseconds projector_latency() const {
     return std::chrono::ceil<std::chrono::microseconds>(
         std::chrono::duration<double, std::milli>(projector_latency_ms));

@@ -342,13 +342,13 @@ void Scanner::pattern(Answer<std::string> answer) {
 }
 
 // Either all cameras take their new settings, or each keeps its old ones.
-Result<> Scanner::set_exposures(const std::vector<CameraOptions>& running, const std::vector<CameraOptions>& wanted) {
-  constexpr auto kTime = 20s;
+Result<> Scanner::set_exposures(const std::vector<CameraOptions>& running, const std::vector<CameraOptions>& wanted,
+                                std::chrono::milliseconds time) {
   const auto exchange = [&](std::size_t i, const CameraOptions& to, const CameraOptions& from) -> Result<> {
     auto camera = make_camera(to), otherwise = make_camera(from);
     if (!camera || !otherwise) return tl::unexpected((camera ? otherwise : camera).error());
-    chore_heartbeat_.promise(kWorkPromise);
-    return rig_->replace(i, std::move(*camera), std::move(*otherwise), steady_clock::now() + kTime);
+    chore_heartbeat_.promise(time + kWorkPromise);
+    return rig_->replace(i, std::move(*camera), std::move(*otherwise), steady_clock::now() + time);
   };
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     if (wanted[i] == running[i]) continue;
@@ -377,7 +377,8 @@ void Scanner::reload(const std::filesystem::path& file, const Configuration& run
         auto made = ScanSetup::create(with_devices, DecodeLanes::lanes_here());
         if (!made) return answer(tl::unexpected(made.error()));
         auto setup = std::make_shared<ScanSetup>(std::move(*made));
-        auto taken = set_exposures(running.cameras, with_exposures_of(running.cameras, configuration->cameras));
+        auto taken = set_exposures(running.cameras, with_exposures_of(running.cameras, configuration->cameras),
+                                   running.scan.camera_settings_time());
         if (!taken) return answer(tl::unexpected(taken.error()));
         {
           const std::lock_guard lock(mutex_);

@@ -126,7 +126,7 @@ class Scanner {
   void submit_chore(Chore chore);
   void refuse_chores();
   [[nodiscard]] Result<> set_exposures(const std::vector<CameraOptions>& running,
-                                       const std::vector<CameraOptions>& wanted);
+                                       const std::vector<CameraOptions>& wanted, std::chrono::milliseconds time);
   [[nodiscard]] std::shared_ptr<Scan> make_scan(ScanRequest request, bool listened, Answer<ScanResult> answer);
   [[nodiscard]] WaitLimit limit_of(Task& task);
   [[nodiscard]] std::function<bool(const Error&)> wait_for_frames(Task& task);

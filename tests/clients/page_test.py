@@ -182,7 +182,8 @@ class Views(unittest.TestCase):
     def test_an_exposure_is_taken_and_one_that_the_camera_refuses_is_not(self):
         double = Double()
         self.addCleanup(double.close)
-        with service_on(double, "exposure_us = 4000.0") as service, Web(service) as web, Browser() as browser, \
+        # After the camera's table: a busy machine is slow to reopen a camera.
+        with service_on(double, "exposure_us = 4000.0\n[scan]\ntimeout_ms = 600000") as service, Web(service) as web, Browser() as browser, \
                 service.client() as client:
             service.wait_ready()
             client.call("set", decode={"density": "pixels"})

@@ -106,6 +106,13 @@ socket_mode = 0o600
   EXPECT_EQ(configuration->server.socket_mode, 0600);
 }
 
+TEST(ScanOptions, GiveCamerasAsLongForSettingsAsAScanMayWaitAndEnoughToReopen) {
+  using std::chrono::milliseconds;
+  EXPECT_EQ(ScanOptions{.timeout_ms = 1}.camera_settings_time(), milliseconds(20'000));
+  EXPECT_EQ(ScanOptions{.timeout_ms = 20'001}.camera_settings_time(), milliseconds(20'001));
+  EXPECT_EQ(ScanOptions{.timeout_ms = 600'000}.camera_settings_time(), milliseconds(600'000));
+}
+
 TEST(ReadConfiguration, KeepsTheKeysAsTheyWereGiven) {
   const auto configuration = read("[decode]\ndepth_min_mm = 500.5\n[[camera]]\npath = \"x\"\nloop = false\n");
   ASSERT_TRUE(configuration) << to_string(configuration.error());
