@@ -17,6 +17,7 @@ THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 BOARDS = pathlib.Path(__file__).resolve().parents[2] / "config" / "boards"
 CAN_SCAN = "!document.getElementById('scan').disabled"
 CLICKS_MAX = 8
+LONG = "\n[scan]\ntimeout_ms = 600000"  # after the camera's table: a busy machine is slow to reopen a camera
 # Where two points of the cloud are in the view.
 TWO_POINTS = """
 const at = view.points.geometry.getAttribute('position').array, place = document.getElementById('space').getBoundingClientRect();
@@ -42,7 +43,7 @@ class Operator(unittest.TestCase):
         double = Double()
         self.addCleanup(double.close)
         for width, height, scheme in ((1600, 1100, "light"), (1280, 900, "dark"), (390, 844, "light")):
-            with service_on(double, "exposure_us = 4000.0") as service, Web(service) as web, \
+            with service_on(double, f"exposure_us = 4000.0{LONG}") as service, Web(service) as web, \
                     tempfile.TemporaryDirectory() as downloads, Browser(downloads) as browser:
                 service.wait_ready()
                 browser.resize(width, height)
@@ -76,6 +77,48 @@ class Operator(unittest.TestCase):
         browser.wait("/mm ±/.test(document.getElementById('distance').textContent)", "no distance")
         browser.click("#save-ply")
         wait_until(lambda: list(pathlib.Path(downloads).glob("*.ply")), "a file")
+
+    def test_sliders_set_exposure_and_gain_and_follow_what_is_in_force(self):
+        double = Double()
+        self.addCleanup(double.close)
+        with service_on(double, f"exposure_us = 4000.0{LONG}") as service, Web(service) as web, Browser() as browser, \
+                service.client() as client:
+            service.wait_ready()
+            browser.resize(1280, 900)
+            browser.open(web.address)
+            number, slider = "document.getElementById('exposure-us')", "document.getElementById('exposure-slider')"
+            browser.wait(f"{number}.value === '4000' && !{number}.disabled", "it does not show what is in force")
+            moved = browser.run(f"const s = {slider}; s.value = 700; s.dispatchEvent(new Event('input')); return Number({number}.value);")
+            self.assertAlmostEqual(moved / (10 * 1e5 ** 0.7), 1, delta=0.01)
+            self.assertEqual(client.call("settings")[0]["cameras"][0]["exposure_us"], 4000)  # while a hand moves it
+            browser.run(f"{slider}.dispatchEvent(new Event('change'));")
+            browser.wait("/^Set: exposure_us/.test(document.getElementById('exposure').textContent)", "it is not set")
+            self.assertEqual(client.call("settings")[0]["cameras"][0]["exposure_us"], moved)
+            browser.run(f"{slider}.focus();")
+            browser.key("\ue014")  # the right arrow
+            wait_until(lambda: client.call("settings")[0]["cameras"][0]["exposure_us"] > moved, "a key does not move it")
+            browser.wait("!moving", "it is still being set")
+            client.call("set", camera={"camera": {"gain_db": 6.0}})  # by another client
+            browser.wait("document.getElementById('gain-db').value === '6'", "the page does not follow")
+            self.assertEqual(browser.run("return document.getElementById('gain-slider').value;"), "60")
+            browser.run("const n = document.getElementById('gain-db'); n.value = 59; n.dispatchEvent(new Event('change'));")
+            browser.wait("/0 to 24, not 59/.test(document.getElementById('message').textContent)", "no reason")
+            browser.wait("document.getElementById('gain-db').value === '6'", "it does not go back")
+            self.assertEqual(client.call("settings")[0]["cameras"][0]["gain_db"], 6)
+            browser.picture(self.folder / "sliders-1280.png")
+            browser.resize(390, 844)
+            browser.click("nav [data-view=camera]")
+            self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390)
+            browser.picture(self.folder / "sliders-390.png")
+            self.assertEqual([told for told in browser.complaints() if "/api/set" not in told], [])  # the one that was refused
+
+    def test_a_camera_without_an_exposure_says_so(self):
+        with Service() as service, Web(service) as web, Browser() as browser:
+            browser.resize(1280, 900)
+            browser.open(web.address)
+            browser.wait("/plays back images/.test(document.getElementById('exposure-note').textContent)", "no word about it")
+            self.assertEqual(browser.run("return ['exposure-slider', 'exposure-us', 'gain-slider', 'gain-db']"
+                                         ".map((id) => document.getElementById(id).disabled);"), [True] * 4)
 
     def test_presets_are_saved_chosen_applied_and_deleted(self):
         with tempfile.TemporaryDirectory() as state, Service(environment={"STATE_DIRECTORY": state}) as service, \

@@ -178,6 +178,7 @@ function showStatus(told) {
     (scans.last_error ? ` Last error: ${scans.last_error.message}` : "");
   cameraSizes = status.cameras.map(({width_px: width, height_px: height}) => ({width, height}));
   showCameras(status.cameras.map((camera) => camera.name));
+  showSettings(told.cameras);
   showPast(told.past);
 }
 
@@ -320,6 +321,7 @@ function begin() {
     });
   }
   beginExposure();
+  beginSliders();
   onClick($("ask-reasons"), showReasons);
   for (const id of ["show-clipping", "show-sharpness"]) $(id).addEventListener("change", showPicture);
   $("login-form").addEventListener("submit", async (event) => {
