@@ -20,6 +20,8 @@ from service import Service, wait_until
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 READY = "document.getElementById('state').textContent === 'Ready to scan.'"
 CAN_SCAN = "!document.getElementById('scan').disabled"
+VIEWS = ("devices", "camera", "cloud", "calibrate", "history")
+CONTROLS = {"button", "checkbox", "combobox", "slider", "spinbutton", "textbox"}
 BACKGROUND = [0x16, 0x18, 0x1c]
 
 # Text that is too faint for its background (WCAG 2.1, 1.4.3: 4.5), with the ratio; disabled controls count, too.
@@ -234,7 +236,7 @@ class Adversity(unittest.TestCase):
             self.assertEqual(browser.run("return [document.getElementById('save-pcd').disabled, "
                                          "document.getElementById('save-hint').hidden];"), [True, False])
 
-    def test_all_text_can_be_read(self):
+    def test_all_text_can_be_read_and_nothing_is_wider_than_the_window(self):
         with Service() as service, Web(service) as web, Browser() as browser:
             service.wait_ready()
             browser.resize(1600, 1400)
@@ -251,16 +253,40 @@ class Adversity(unittest.TestCase):
                 browser.run("""
                     say("test", new Error("a complaint"));
                     document.getElementById("distance").textContent = "a distance";
+                    for (const record of [10, 500, 900, 1500]) measurements.add(pointOf(view.ply, record));
                     for (const each of document.querySelectorAll("[hidden]")) each.hidden = false;
+                    for (const each of document.querySelectorAll("details")) each.open = true;
                     for (const kind of ["good", "wait", "bad"]) document.getElementById("verdict").append(element("p", kind, kind));
                     document.getElementById("save-pcd").disabled = true;""")
-                looked, faint = browser.run(FAINT)
-                self.assertEqual((looked > 50, faint), (True, []), scheme)
-                browser.picture(self.folder / f"all-{scheme}-1600.png")
-                browser.resize(390, 844)
-                self.assertEqual(browser.run(FAINT)[1], [], scheme)
+                for width, height in ((1600, 1400), (1280, 900), (390, 844)):
+                    browser.resize(width, height)
+                    for view in VIEWS if width < 1100 else ("all",):
+                        if width < 1100:
+                            browser.click(f"nav [data-view={view}]")
+                        looked, faint = browser.run(FAINT)
+                        self.assertEqual((looked > (50 if width > 1100 else 8), faint), (True, []), (scheme, width, view))
+                        self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), width, (scheme, view))
+                        browser.picture(self.folder / f"{view}-{scheme}-{width}.png")
                 browser.resize(1600, 1400)
+                browser.key("?")
+                self.assertEqual(browser.run(FAINT)[1], [], f"help, {scheme}")
                 browser.devtools("Network.clearBrowserCookies")
+
+    def test_every_control_has_a_name_for_screen_readers(self):
+        with Service() as service, Web(service) as web, Browser() as browser:
+            service.wait_ready()
+            browser.resize(1600, 1400)
+            browser.open(web.address)
+            browser.wait(CAN_SCAN, "nothing to draw clouds with")
+            self.scan(browser, "symbols")
+            browser.run("for (const record of [10, 500]) measurements.add(pointOf(view.ply, record));"
+                        "for (const each of document.querySelectorAll('details')) each.open = true;")
+            nodes = browser.devtools("Accessibility.getFullAXTree")["nodes"]
+            controls = [(node["role"]["value"], node.get("name", {}).get("value", "")) for node in nodes
+                        if not node["ignored"] and node["role"]["value"] in CONTROLS]
+            self.assertGreater(len(controls), 35)
+            self.assertEqual({role for role, _ in controls} >= {"button", "checkbox", "combobox", "slider", "textbox"}, True)
+            self.assertEqual([role for role, name in controls if not name.strip()], [])
 
 
 if __name__ == "__main__":

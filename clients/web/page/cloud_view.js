@@ -32,6 +32,12 @@ function column(ply, name, spread = true) {
   return values;
 }
 
+// Of a field, as rangeOf() has it, without a column of its own.
+function rangeOfField(ply, name) {
+  const {offset} = ply.fields[name], from = new DataView(ply.buffer, ply.begin), step = Math.max(1, Math.floor(ply.count / 20000));
+  return rangeOf(Float32Array.from({length: Math.ceil(ply.count / step)}, (_, i) => from.getFloat32(i * step * ply.record + offset, true)));
+}
+
 // y and z are turned round, as the screen has y up and looks along -z.
 function positions(ply) {
   const view = new DataView(ply.buffer);
@@ -193,7 +199,8 @@ class CloudView {
   // By a column of the cloud; by depth where it has no such column.
   paint() {
     if (!this.ply) return null;
-    const depths = column(this.ply, "z"), values = column(this.ply, this.colour) || depths;
+    const values = column(this.ply, this.colour) || column(this.ply, "z");
+    const depths = this.limits && column(this.ply, "z");
     const grey = this.colour === "intensity", [near, far] = this.limits || [-Infinity, Infinity];
     this.range = grey ? [0, 255] : this.colour === "z" && this.limits ? this.limits : rangeOf(values);
     const colours = coloursOf(values, this.range, grey, this.shaded && !grey ? this.shade() : null, depths,

@@ -18,7 +18,7 @@ function showDepthLimits() {
 
 // With a margin, so that the sliders' ends lie outside of every point but strays.
 function offerDepths(ply) {
-  const [low, high] = ply.count > 0 ? rangeOf(column(ply, "z", false)) : [0, 1], margin = 0.1 * (high - low);
+  const [low, high] = ply.count > 0 ? rangeOfField(ply, "z") : [0, 1], margin = 0.1 * (high - low);
   depthsOfCloud = ply.count > 0 ? [low - margin, high + margin] : null;
   showDepthLimits();
 }

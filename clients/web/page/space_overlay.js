@@ -9,7 +9,7 @@ const kBarShare = 0.25;  // of the view's width, at most
 // The box around nearly all points, mm, x right, y down, z away; none without points.
 function boxOf(ply) {
   if (ply.count === 0) return null;
-  return kAxes.map((name) => rangeOf(column(ply, name, false)));
+  return kAxes.map((name) => rangeOfField(ply, name));
 }
 
 const corner = (box, [i, j, k]) => [box[0][i], box[1][j], box[2][k]];
@@ -89,7 +89,9 @@ class SpaceOverlay {
       const share = (value - low) / (high - low), at = this.onScreen(ends[0].map((start, i) => start + share * (ends[1][i] - start)));
       if (at) this.write(context, tickLabel(value, step), at[0] - (upright ? 5 : 0), at[1] + (upright ? 0 : 4));
     }
-    this.write(context, kAxes[axis] + " mm", (from[0] + to[0]) / 2 - (upright ? 5 : 0), (from[1] + to[1]) / 2 + (upright ? -16 : 18));
+    const end = from[1] < to[1] ? from : to;
+    if (upright) this.write(context, kAxes[axis] + " mm", end[0] - 5, end[1] - 10);
+    else this.write(context, kAxes[axis] + " mm", (from[0] + to[0]) / 2, (from[1] + to[1]) / 2 + 18);
     context.textAlign = "left";
     context.textBaseline = "alphabetic";
   }
