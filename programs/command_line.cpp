@@ -79,7 +79,7 @@ void add_extrinsics_options(CLI::App& app, ExtrinsicsRequest& request) {
   app.add_option("--places", request.places, "with --extrinsics: how many places of the board to measure (3)")
       ->check(between(1, 99))
       ->needs(extrinsics);
-  for (const char* other : {"--calibrate", "--verify", "--pattern", "--check", "--check-config", "--list"})
+  for (const char* other : {"--calibrate", "--verify", "--correct", "--pattern", "--check", "--check-config", "--list"})
     extrinsics->excludes(app.get_option(other));
 }
 
@@ -101,20 +101,28 @@ void add_options(CLI::App& app, CommandLine& line) {
   auto* calibrate = app.add_flag("--calibrate", line.calibrate, "calibrate the scanner");
   auto* verify =
       app.add_flag("--verify", line.verify, "check the calibration in force by measuring a board or a plane");
+  auto* correct = app.add_flag("--correct", line.request.correct,
+                               "repair the calibration in force from one look at a board, if it drifted");
+  auto* undo =
+      app.add_flag("--undo", line.undo, "with --correct: bring back the calibration as it was before")->needs(correct);
   add_calibration_options(app, line);
+  undo->excludes("--from")->excludes("--board");
+  for (auto* other : {calibrate, verify, pattern, check, check_configuration, list}) correct->excludes(other);
   calibrate->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
   verify->excludes(pattern)->excludes(check)->excludes(list);
   pattern->excludes(check)->excludes(list);
   check->excludes(list);
   check_configuration->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(list);
   add_extrinsics_options(app, line.extrinsics);
-  replay->excludes(calibrate)->excludes(verify)->excludes(pattern)->excludes(check)->excludes(check_configuration);
+  replay->excludes(calibrate)->excludes(verify)->excludes(correct)->excludes(pattern)->excludes(check)->excludes(
+      check_configuration);
   replay->excludes(list)->excludes(app.get_option("--extrinsics"));
   add_print_options(app, line.print)
       ->excludes(replay)
       ->excludes(pattern)
       ->excludes(calibrate)
       ->excludes(verify)
+      ->excludes(correct)
       ->excludes(check)
       ->excludes(check_configuration)
       ->excludes(list)
@@ -123,17 +131,18 @@ void add_options(CLI::App& app, CommandLine& line) {
 
 /// --from, --board and --ruler belong to several commands.
 void check_commands(const CLI::App& app, const CommandLine& line) {
-  if (line.verify && app.count("--ruler") > 0 && app.count("--board") == 0) {
-    throw CLI::RequiresError("--ruler with --verify", "--board");
+  const bool looks = line.verify || line.request.correct;
+  if (looks && app.count("--ruler") > 0 && app.count("--board") == 0) {
+    throw CLI::RequiresError(line.verify ? "--ruler with --verify" : "--ruler with --correct", "--board");
   }
-  if (line.calibrate || line.verify) return;
+  if (line.calibrate || looks) return;
   const bool extrinsics = !line.extrinsics.file.empty();
   for (const char* option : {"--from", "--ruler"}) {
     if (app.count(option) > 0 && !(extrinsics && option == std::string_view("--ruler")))
-      throw CLI::RequiresError(option, "--calibrate or --verify");
+      throw CLI::RequiresError(option, "--calibrate, --verify or --correct");
   }
   if (app.count("--board") > 0 && line.print.file.empty() && !extrinsics) {
-    throw CLI::RequiresError("--board", "--calibrate, --verify, --extrinsics or --print-board");
+    throw CLI::RequiresError("--board", "--calibrate, --verify, --correct, --extrinsics or --print-board");
   }
 }
 

@@ -26,14 +26,14 @@ struct CommandLine {
   std::filesystem::path bundle;  ///< the bundle to replay
   std::filesystem::path folder;  ///< folder for its content; empty: none
   bool check = false, check_configuration = false, list = false, as_json = false;
-  bool calibrate = false, latency = false, verify = false;
+  bool calibrate = false, latency = false, verify = false, undo = false;
   CalibrateRequest request;
   PrintRequest print;
   ExtrinsicsRequest extrinsics;
 
   /// Tells whether slsd-calibrate carries out this command.
   [[nodiscard]] bool calibrates() const {
-    return calibrate || verify || !print.file.empty() || !extrinsics.file.empty();
+    return calibrate || verify || request.correct || !print.file.empty() || !extrinsics.file.empty();
   }
 };
 

@@ -9,6 +9,7 @@
 #include "programs/calibrate/measure_extrinsics.hpp"
 #include "programs/calibrate/session/session.hpp"
 #include "programs/command_line.hpp"
+#include "programs/verify/keep_correction.hpp"
 #include "programs/verify/verify_from_files.hpp"
 #include "programs/verify/verify_live.hpp"
 
@@ -24,17 +25,19 @@ slsd::Result<> carry_out(const slsd::CommandLine& line) {
   if (!line.print.file.empty()) return slsd::print_board(line.print);
   if (line.calibrate) return calibrate(line);
   if (!line.extrinsics.file.empty()) return slsd::measure_extrinsics(line.extrinsics, line.request);
+  if (line.undo) return slsd::undo_correction(line.configuration);
   return line.request.from.empty() ? slsd::verify_live(line.request) : slsd::verify_from_files(line.request);
 }
 
 }  // namespace
 
-// Carries out slsd's --calibrate, --verify, --extrinsics and --print-board.
+// Carries out slsd's --calibrate, --verify, --correct, --extrinsics and --print-board.
 int main(int argc, char** argv) {
   const auto line = slsd::parse_command_line(argc, argv);
   if (!line) return line.error();
   if (!line->calibrates()) {
-    std::cerr << "slsd-calibrate: needs --calibrate, --verify, --extrinsics or --print-board; slsd is the service\n";
+    std::cerr << "slsd-calibrate: needs --calibrate, --verify, --correct, --extrinsics or --print-board; slsd is the "
+                 "service\n";
     return slsd::kWrongUsage;
   }
   FLAGS_minloglevel = google::GLOG_FATAL;  // the result is judged anyway, so Ceres need not warn

@@ -134,6 +134,7 @@ CalibrationReport read_report(FileSection& section) {
   report.projector_sigma = read_sigma(section, "projector_sigma");
   if (section.has("board")) report.board = section.text("board");
   if (section.has("date")) report.date = section.text("date");
+  if (section.has("corrected")) report.corrected = section.text("corrected");
   if (section.has("projector_serial")) report.projector_serial = section.text("projector_serial");
   return report;
 }

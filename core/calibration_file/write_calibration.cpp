@@ -63,6 +63,7 @@ void write_report(YamlWriter& file, const CalibrationReport& report) {
   write_sigma(file, "projector_sigma", report.projector_sigma);
   file.write("board", report.board);
   file.write("date", report.date);
+  file.write("corrected", report.corrected);
   file.write("projector_serial", report.projector_serial);
 }
 

@@ -44,6 +44,7 @@ struct CalibrationReport {
   std::vector<std::vector<double>> camera_sigma;  ///< one for each camera, or empty
   std::optional<std::string> board;
   std::optional<std::string> date;
+  std::optional<std::string> corrected;  ///< when and by what slsd --correct changed the calibration; empty: never
   std::optional<std::string> projector_serial;
   std::vector<std::string> camera_serials;  ///< one for each camera, or empty
   std::optional<double> epipolar_error_px;  ///< root mean square, in the projector

@@ -46,6 +46,15 @@ Result<> check_size(const CapturedPictures& pictures, const CalibratedCamera& ca
   return {};
 }
 
+/// Three depths: those of the calibration's own deviations, or over the configured range.
+std::vector<double> depths_to_predict(const Calibration& calibration, const Configuration& configuration) {
+  std::vector<double> depths_mm;
+  for (const CalibrationReport::DepthSigma& known : calibration.report.depth_sigma) depths_mm.push_back(known.depth_mm);
+  if (!depths_mm.empty()) return depths_mm;
+  const double near_mm = configuration.decode.depth_min_mm, far_mm = configuration.decode.depth_max_mm;
+  return {near_mm, 0.5 * (near_mm + far_mm), far_mm};
+}
+
 }  // namespace
 
 Result<Verifier> Verifier::create(const CalibrateRequest& request, const Configuration& configuration, Pattern pattern,
@@ -68,11 +77,18 @@ Result<Verifier> Verifier::create(const CalibrateRequest& request, const Configu
   Verifier verifier(std::move(**calibration), *board, std::move(pattern));
   verifier.gray_code_ = gray_code;
   verifier.board_asked_for_ = !request.board.empty();
+  verifier.needs_board_ = request.correct;
+  verifier.correct_options_ = {!request.ruler.empty(), depths_to_predict(verifier.calibration_, configuration)};
+  verifier.looks_.projector = projector;
+  for (const CalibratedCamera& camera : verifier.calibration_.cameras) {
+    verifier.looks_.cameras.push_back({camera.name, size_of(camera.lens)});
+  }
   verifier.limits_.epipolar_px = epipolar_limit_px(verifier.calibration_.report.epipolar_error_px);
   if (!configuration.cameras.empty()) verifier.first_camera_ = configuration.cameras.front().name();
   const auto& date = verifier.calibration_.report.date;
-  std::cout << fmt::format("calibration {}{}, board {}\n", configuration.calibration_file.string(),
-                           date ? " of " + *date : "", to_string(*board));
+  const auto& corrected = verifier.calibration_.report.corrected;
+  std::cout << fmt::format("calibration {}{}{}, board {}\n", configuration.calibration_file.string(),
+                           date ? " of " + *date : "", corrected ? ", corrected " + *corrected : "", to_string(*board));
   return verifier;
 }
 
@@ -102,12 +118,23 @@ Result<PoseView> Verifier::observe(const CapturedPictures& owned, std::size_t ca
   return view;
 }
 
-Result<> Verifier::look(const std::string& name, const std::string& camera, const CapturedPictures& pictures) {
+Result<> Verifier::look(const std::string& pose, const std::string& camera, const CapturedPictures& pictures) {
+  const std::string name = pose + (pose.empty() || camera.empty() ? "" : " ") + camera;
   const CalibratedCamera* const known = calibration_.camera(camera.empty() ? first_camera_ : camera);
   if (known == nullptr) return fail(ErrorCode::kNotFound, "the calibration has no camera of this name", camera);
   if (auto fits = check_size(pictures, *known, name); !fits) return fits;
+  if (needs_board_ && size_of(pictures.white) == ImageSize{}) {
+    return fail(ErrorCode::kNotFound, "has no white.png, in which a correction finds the board", name);
+  }
   std::string remark;
-  const auto view = observe(pictures, static_cast<std::size_t>(known - calibration_.cameras.data()), remark);
+  const auto index = static_cast<std::size_t>(known - calibration_.cameras.data());
+  const auto view = observe(pictures, index, remark);
+  if (needs_board_ && !remark.empty()) return fail(ErrorCode::kNotFound, remark, name);
+  if (needs_board_ && !view) return fail(view.error().code, to_string(view.error()), name);
+  if (view && !view->corners.empty()) {
+    if (looks_.poses.empty() || looks_.poses.back().name != pose) looks_.poses.emplace_back().name = pose;
+    looks_.poses.back().views.push_back(*view), looks_.poses.back().views.back().camera = index;
+  }
   if (!remark.empty()) std::cout << fmt::format("{}: measured as a plain plane: {}\n", name, remark);
   const auto check = view ? check_view(*view, *known, calibration_.projector) : tl::unexpected(view.error());
   if (!check) {
@@ -119,6 +146,27 @@ Result<> Verifier::look(const std::string& name, const std::string& camera, cons
   return {};
 }
 
+Result<Correction> Verifier::find_correction() const {
+  if (looks_.poses.empty()) return fail(ErrorCode::kNotFound, "a correction needs a look at the board");
+  return correct_calibration(looks_, board_, calibration_, correct_options_);
+}
+
+void Verifier::check_again(const Calibration& calibration) const {
+  for (const PoseObservation& pose : looks_.poses) {
+    for (const PoseView& view : pose.views) {
+      const auto check = check_view(view, calibration.cameras[view.camera], calibration.projector);
+      if (check) std::cout << fmt::format("after: {}\n", check_text(*check, limits_));
+    }
+  }
+}
+
+/// Names the correction that would repair a calibration which no longer fits; empty: none.
+std::string Verifier::offer() const {
+  const auto correction = find_correction();
+  if (!correction || !correction->needed) return {};
+  return fmt::format(". Or repair it from this look with slsd --correct: {}", correction->drift);
+}
+
 Result<> Verifier::finish() const {
   if (checks_.empty()) {
     return fail(ErrorCode::kNotFound,
@@ -128,7 +176,7 @@ Result<> Verifier::finish() const {
   const VerifySummary summary = summarise(checks_, limits_);
   std::cout << summary_text(summary, limits_) << std::flush;
   if (!summary.faults.empty()) {
-    return fail(ErrorCode::kMismatch, "the calibration no longer fits: " + advice(summary));
+    return fail(ErrorCode::kMismatch, "the calibration no longer fits: " + advice(summary) + offer());
   }
   if (board_asked_for_ && summary.views_with_board == 0) {
     return fail(ErrorCode::kNotFound, "the board was never in view, so distances were not checked: show it",

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/board/board.hpp"
+#include "core/calibrate/correct/correct.hpp"
 #include "core/calibrate/observe/observe_pose.hpp"
 #include "core/calibrate/verify/verify.hpp"
 #include "core/code/codebook.hpp"
@@ -29,22 +30,31 @@ class Verifier {
                                                Pattern pattern, bool gray_code);
 
   /// Evaluates one camera's look. Prints what cannot be measured, and does not count it.
-  /// @param name      printed before the result
+  /// @param pose      groups the looks of several cameras; printed before the result, with the camera
   /// @param camera    its name; empty: the first configured one
   /// @param pictures  without a white one: a plain plane
-  /// @errors kNotFound: the calibration does not contain the camera; kMismatch: the pictures have another size
-  [[nodiscard]] Result<> look(const std::string& name, const std::string& camera, const CapturedPictures& pictures);
+  /// @errors kNotFound: the calibration does not contain the camera, or a correction needs the board, which was not
+  ///         found; kMismatch: the pictures have another size
+  [[nodiscard]] Result<> look(const std::string& pose, const std::string& camera, const CapturedPictures& pictures);
 
   /// Prints the result of all looks together.
   /// @errors kMismatch: the calibration no longer holds; the message says what to do; kNotFound: nothing was measured,
   ///         or the requested board was never seen
   [[nodiscard]] Result<> finish() const;
 
+  /// Finds out from the looks at the board how to correct the calibration, and prints how far off it is. Changes no
+  /// file.
+  /// @errors those of correct_calibration()
+  [[nodiscard]] Result<Correction> find_correction() const;
+  /// Prints the checks of the looks again, with another calibration.
+  void check_again(const Calibration& calibration) const;
+
   [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
 
  private:
   Verifier(Calibration calibration, Board board, Pattern pattern)
       : calibration_(std::move(calibration)), board_(board), pattern_(std::move(pattern)) {}
+  [[nodiscard]] std::string offer() const;
   [[nodiscard]] Result<PoseView> observe(const CapturedPictures& pictures, std::size_t camera, std::string& remark);
   [[nodiscard]] Result<PoseView> observe_without_board(const PosePictures& pictures, bool has_white,
                                                        PatternReader& reader) const;
@@ -54,10 +64,12 @@ class Verifier {
   IndexedPattern pattern_;
   std::string first_camera_;
   bool gray_code_ = false;
-  bool board_asked_for_ = false;
+  bool board_asked_for_ = false, needs_board_ = false;
+  CorrectOptions correct_options_;
   VerifyLimits limits_;
   std::map<std::size_t, PatternReader> readers_;  // one for each camera: each remembers where its pattern lies
   std::vector<ViewCheck> checks_;
+  Observations looks_;  // at the board
 };
 
 }  // namespace slsd

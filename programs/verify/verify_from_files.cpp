@@ -7,6 +7,7 @@
 #include "daemon/configuration/settings_over.hpp"
 #include "drivers/files/read_image.hpp"
 #include "programs/calibrate/captures/captured_pattern.hpp"
+#include "programs/verify/keep_correction.hpp"
 #include "programs/verify/verifier.hpp"
 
 namespace slsd {
@@ -52,13 +53,12 @@ Result<> verify_from_files(const CalibrateRequest& request) {
   if (!verifier) return tl::unexpected(verifier.error());
   for (const CapturedPose& pose : *poses) {
     for (const auto& [camera, files] : pose.cameras) {
-      const std::string name = camera.empty() ? pose.name : pose.name + " " + camera;
       const auto pictures = load(files, gray_code);
-      if (!pictures) return fail(pictures.error().code, to_string(pictures.error()), name);
-      if (auto looked = verifier->look(name, camera, *pictures); !looked) return looked;
+      if (!pictures) return fail(pictures.error().code, to_string(pictures.error()), pose.name + " " + camera);
+      if (auto looked = verifier->look(pose.name, camera, *pictures); !looked) return looked;
     }
   }
-  return verifier->finish();
+  return request.correct ? keep_correction(*verifier, configuration->calibration_file) : verifier->finish();
 }
 
 }  // namespace slsd

@@ -7,6 +7,7 @@
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/scan_setup.hpp"
 #include "programs/calibrate/session/device_source.hpp"
+#include "programs/verify/keep_correction.hpp"
 #include "programs/verify/verifier.hpp"
 
 namespace slsd {
@@ -40,9 +41,9 @@ Result<> verify_live(const CalibrateRequest& request) {
     CapturedPictures pictures;
     pictures.white = std::move((*white)[i]);
     pictures.coded.push_back(std::move((*coded)[i]));
-    if (auto looked = verifier->look(cameras[i], cameras[i], pictures); !looked) return looked;
+    if (auto looked = verifier->look("", cameras[i], pictures); !looked) return looked;
   }
-  return verifier->finish();
+  return request.correct ? keep_correction(*verifier, configuration->calibration_file) : verifier->finish();
 }
 
 }  // namespace slsd

@@ -131,14 +131,21 @@ class Slsd(unittest.TestCase):
 
     def test_calibrating_and_verifying_say_what_they_lack(self):
         service = Service()
-        for command in ("--calibrate", "--verify"):
+        for command in ("--calibrate", "--verify", "--correct"):
             result = slsd(command, "--from", self.folder, "--config", service.file)
             self.assertEqual(result.returncode, 1, command)
             self.assertIn("has no pose", result.stderr)
         for usage in (["--from", self.folder], ["--board", "charuco"], ["--calibrate", "--verify"], ["--poses", "5"],
-                      ["--verify", "--ruler", "200:201"],
+                      ["--verify", "--ruler", "200:201"], ["--correct", "--ruler", "200:201"], ["--correct", "--verify"],
+                      ["--undo"], ["--correct", "--undo", "--from", self.folder],
                       ["--plane", "plane:8x5:100:40:DICT_4X4_50"], ["--calibrate", "--planes", "2"]):
             self.assertEqual(slsd(*usage).returncode, 2, usage)
+
+    def test_undoes_no_correction_that_was_not_made(self):
+        service = Service()
+        result = slsd("--correct", "--undo", "--config", service.file)
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("nothing to undo", result.stderr)
 
     def test_lists_devices(self):
         service = Service()

@@ -33,6 +33,7 @@ Calibration two_cameras() {
   report.verdict = "good";
   report.projector_sigma.assign(9, 0.25), report.camera_sigma = {std::vector<double>(9, 0.5), {}};
   report.board = "charuco 12x9", report.date = "2026-03-01";
+  report.corrected = "2026-09-01 the projector turned by 0.100 +- 0.004 degrees";
   report.projector_serial = "P-77", report.camera_serials = {"C-1", "C-2"};
   return rig;
 }
@@ -85,6 +86,7 @@ TEST(ReadCalibration, ReturnsWhatWasWritten) {
   EXPECT_EQ(read->report.camera_sigma, written.report.camera_sigma);
   EXPECT_EQ(read->report.board, "charuco 12x9");
   EXPECT_EQ(read->report.date, "2026-03-01");
+  EXPECT_EQ(read->report.corrected, written.report.corrected);
   EXPECT_EQ(read->report.projector_serial, "P-77");
   EXPECT_EQ(read->report.camera_serials, written.report.camera_serials);
 }
