@@ -189,6 +189,9 @@ Cloud Scanner::scan(const ScanOptions& options) {
   if (!options.coordinate_frame.empty()) params["coordinate_frame"] = options.coordinate_frame;
   if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose;
   if (!options.poses.empty()) params["poses"] = options.poses;
+  if (!options.box.empty()) params["box"] = options.box;
+  if (options.voxel_mm) params["voxel_mm"] = *options.voxel_mm;
+  if (options.stride) params["stride"] = *options.stride;
   if (options.picture) params["picture"] = true;
   if (options.why) params["why"] = true;
   if (options.frames) params["frames"] = "raw";

@@ -34,6 +34,9 @@ struct ClientOptions {
   std::string coordinate_frame;             ///< scan: "rig" or "robot_base"; empty: as configured
   std::vector<double> robot_pose;           ///< scan: the robot's numbers; empty: none
   std::string pose_notation;                ///< scan: how the robot writes them
+  std::vector<double> box;                  ///< scan: corners of the part to measure, mm; empty: as configured
+  std::optional<double> voxel_mm;           ///< scan
+  std::optional<int> stride;                ///< scan
   bool normals = false;                     ///< scan: normals of pixels
   bool mesh = false;                        ///< scan: triangles of pixels
   bool texture = false;                     ///< scan: intensities from a frame in white light

@@ -128,6 +128,9 @@ json scan_parameters(const ClientOptions& options, const std::string& density) {
   if (options.why) params["why"] = true;
   if (!density.empty()) params["density"] = density;
   if (!options.camera.empty()) params["camera"] = options.camera;
+  if (!options.box.empty()) params["box"] = options.box;
+  if (options.voxel_mm) params["voxel_mm"] = *options.voxel_mm;
+  if (options.stride) params["stride"] = *options.stride;
   if (!options.preset.empty()) params["preset"] = options.preset;
   if (!options.coordinate_frame.empty()) params["coordinate_frame"] = options.coordinate_frame;
   if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose, params["poses"] = options.pose_notation;

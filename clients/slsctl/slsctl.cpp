@@ -71,6 +71,16 @@ void add_scan(CLI::App& app, ClientOptions& options) {
       ->check(one_of({"ply", "pcd", "tiff", "stl", "obj", "glb"}))
       ->needs(output);
   add_density(scan, options);
+  scan->add_option("--box", options.box, "measure within this box alone: the least and the other corner, in mm")
+      ->delimiter(',')
+      ->expected(6)
+      ->type_name("X,Y,Z,X,Y,Z");
+  scan->add_option("--voxel-mm", options.voxel_mm, "keep one point, the most certain, of each cube of this side")
+      ->check(between(0, 1000))
+      ->type_name("MM");
+  scan->add_option("--stride", options.stride, "keep the pixels of every Nth row and column")
+      ->check(between(1, 64))
+      ->type_name("N");
   scan->add_option("--preset", options.preset, "scan with the settings of this preset, which stay in force")
       ->type_name("NAME");
   scan->add_option("--coordinate-frame", options.coordinate_frame, "the frame of the points (as configured)")

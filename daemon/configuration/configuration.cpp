@@ -81,6 +81,12 @@ void read_keys(TableReader& reader, FrameOptions& options) {
   reader.read("hand_eye", options.hand_eye);
 }
 
+void read_keys(TableReader& reader, CloudOptions& options) {
+  reader.read("box", options.box);
+  reader.read("voxel_mm", options.voxel_mm);
+  reader.read("stride", options.stride);
+}
+
 void read_keys(TableReader& reader, ScanOptions& options) {
   reader.read("timeout_ms", options.timeout_ms);
   reader.read("exposure_skew_ms", options.exposure_skew_ms);
@@ -169,8 +175,8 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   TableReader top(&document, "", file);
   const auto table = [&](const std::string& name) { return TableReader(top.table(name), "[" + name + "]", file); };
   const TableReader projector = table("projector"), pattern = table("pattern"), calibration = table("calibration"),
-                    decode = table("decode"), frame = table("frame"), scan = table("scan"), server = table("server"),
-                    black_box = table("black_box");
+                    decode = table("decode"), cloud = table("cloud"), frame = table("frame"), scan = table("scan"),
+                    server = table("server"), black_box = table("black_box");
   const std::vector<const toml::table*> cameras = top.tables("camera");
   Configuration configuration;
   Result<> read = top.finish();
@@ -184,6 +190,7 @@ Result<Configuration> read_tables(const toml::table& document, const path& file)
   if (read) read = read_calibration_table(calibration, configuration);
   if (read) read = read_table(decode, configuration.decode);
   if (read) read = read_table(frame, configuration.frame);
+  if (read) read = read_table(cloud, configuration.cloud);
   if (read) read = read_table(scan, configuration.scan);
   if (read) read = read_table(server, configuration.server);
   if (read) read = read_table(black_box, configuration.black_box);
@@ -215,6 +222,7 @@ std::vector<std::string> known_keys() {
   add("calibration", [&](auto& reader) { read_calibration_keys(reader, ignored); });
   add("decode", [&](auto& reader) { read_keys(reader, ignored.decode); });
   add("frame", [&](auto& reader) { read_keys(reader, ignored.frame); });
+  add("cloud", [&](auto& reader) { read_keys(reader, ignored.cloud); });
   add("scan", [&](auto& reader) { read_keys(reader, ignored.scan); });
   add("server", [&](auto& reader) { read_keys(reader, ignored.server); });
   add("black_box", [&](auto& reader) { read_keys(reader, ignored.black_box); });

@@ -15,6 +15,7 @@
 #include "core/result.hpp"
 #include "daemon/configuration/black_box_options.hpp"
 #include "daemon/configuration/camera_options.hpp"
+#include "daemon/configuration/cloud_options.hpp"
 #include "daemon/configuration/frame_options.hpp"
 #include "daemon/configuration/projector_options.hpp"
 #include "daemon/configuration/scan_options.hpp"
@@ -37,6 +38,7 @@ struct Configuration {
   OtherHardware other_hardware = OtherHardware::kError;
   DecodeOptions decode;
   FrameOptions frame;
+  CloudOptions cloud;
   ScanOptions scan;
   ServerOptions server;
   BlackBoxOptions black_box;

@@ -26,7 +26,7 @@ constexpr std::size_t kConfigurationBytesMax = 1 << 20;
 constexpr std::size_t kKeptBytesMax = 64 << 10;
 constexpr std::size_t kKeysMax = 64;
 constexpr std::size_t kListMax = 64;
-constexpr std::array kTables{"pattern", "calibration", "decode"};
+constexpr std::array kTables{"pattern", "calibration", "decode", "cloud"};
 constexpr std::array kCameraKeys{"exposure_us", "gain_db", "gain_steps"};
 
 tl::unexpected<Error> refuse(const std::string& what) {
@@ -121,8 +121,9 @@ Result<json> merge_settings(json before, const json& changes) {
       }
       if (before.contains(table) && before[table].empty()) before.erase(table);
     } else {
-      merged = refuse("\"" + printable(table, 64) +
-                      "\" can only be set in the configuration file; set pattern, calibration, decode or camera here");
+      merged = refuse(
+          "\"" + printable(table, 64) +
+          "\" can only be set in the configuration file; set pattern, calibration, decode, cloud or camera here");
     }
     if (!merged) return tl::unexpected(merged.error());
   }

@@ -65,6 +65,19 @@ std::vector<double> ParamReader::numbers(const char* name, std::size_t count_max
   return {};
 }
 
+std::optional<std::vector<double>> ParamReader::numbers(const char* name, std::size_t count, double low, double high) {
+  const auto* value = find(name);
+  if (value == nullptr) return std::nullopt;
+  const auto fits = [&](const nlohmann::json& each) {
+    return each.is_number() && each.get<double>() >= low && each.get<double>() <= high;
+  };
+  if (value->is_array() && (value->empty() || value->size() == count) && std::ranges::all_of(*value, fits))
+    return value->get<std::vector<double>>();
+  refuse(name, std::to_string(count) + " numbers from " + nlohmann::json(low).dump() + " to " +
+                   nlohmann::json(high).dump() + ", or an empty list");
+  return std::nullopt;
+}
+
 std::string ParamReader::text(const char* name, std::size_t bytes_max) {
   const auto* value = find(name);
   if (value == nullptr) return {};

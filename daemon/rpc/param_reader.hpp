@@ -28,6 +28,9 @@ class ParamReader {
   [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
   /// The number of that name; empty if missing.
   [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
+  /// List of so many numbers, or an empty list; nothing if missing.
+  [[nodiscard]] std::optional<std::vector<double>> numbers(const char* name, std::size_t count, double low,
+                                                           double high);
   /// A text of at most this many bytes. It may contain control characters: use printable() before quoting it.
   [[nodiscard]] std::string text(const char* name, std::size_t bytes_max = kMaxTextBytes);
   /// A list of at most this many finite numbers; empty if missing.

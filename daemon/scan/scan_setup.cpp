@@ -199,6 +199,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   }
   setup.image = draw_pattern(setup.pattern);
   setup.decode = configuration.decode;
+  setup.part = configuration.cloud.part();
   setup.depth_min_mm = configuration.decode.depth_min_mm;
   setup.depth_max_mm = configuration.decode.depth_max_mm;
   if (!setup.calibration) return setup;
@@ -209,6 +210,8 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   if (!first) return tl::unexpected(first.error());
   for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));
   if (lanes > 0) setup.lanes.push_back(std::move(*first));
+  if (const auto seen = setup.check_box(setup.part); !seen)
+    return fail(seen.error().code, seen.error().message, "[cloud] box");
   if (setup.decode.density != Density::kPixels) return setup;
   // Makes the first scan wait for little but the field of its blur.
   for (std::size_t lane = 0; lane < setup.lanes.size(); ++lane) {
@@ -224,6 +227,7 @@ Result<> ScanSetup::check(const ScanRequest& request) const {
   if (!calibration) {
     return fail(ErrorCode::kNotFound, "no calibration: calibrate, or set [calibration] file in the configuration");
   }
+  if (auto seen = check_box(request.part.value_or(part)); !seen) return seen;
   return check_camera(request.camera);
 }
 
@@ -243,6 +247,19 @@ std::optional<RigidTransform> ScanSetup::base_from_rig(const std::optional<Rigid
   if (hand_eye->mounted == Mounted::kCell) return hand_eye->mount_from_rig;
   if (!base_from_flange) return std::nullopt;
   return base_from_flange->after(hand_eye->mount_from_rig);
+}
+
+Result<> ScanSetup::check_box(const CloudPart& wanted) const {
+  if (!wanted.box || lanes.empty()) return {};
+  const bool seen = std::ranges::any_of(lanes.front(), [&](const Decoder& decoder) {
+    const CalibratedCamera& camera = calibration->cameras[decoder.camera_index()];
+    return pixels_of_box(*wanted.box, camera, depth_min_mm, depth_max_mm).has_value();
+  });
+  if (seen) return {};
+  return fail(ErrorCode::kInvalidArgument,
+              "no camera sees the box between depth_min_mm and depth_max_mm: its corners are in the frame of the first "
+              "camera, x to the right, y down, z forward, in mm",
+              "box");
 }
 
 Result<> ScanSetup::check_camera(const std::string& name) const {

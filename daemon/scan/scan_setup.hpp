@@ -95,6 +95,7 @@ struct ScanSetup {
   std::vector<std::string> camera_formats = {};  ///< configured formats, such as "Mono12"; an empty text if not set
   std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
   DecodeOptions decode = {};
+  CloudPart part = {};  ///< unless a request asks for another
   std::unique_ptr<DenseMappers> dense = std::make_unique<DenseMappers>();
   std::unique_ptr<Crew> crew = std::make_unique<Crew>(Crew::helpers_here());  ///< helps the lanes
   std::unique_ptr<EmptyClouds> empty_clouds = std::make_unique<EmptyClouds>();
@@ -111,7 +112,8 @@ struct ScanSetup {
   [[nodiscard]] static Result<ScanSetup> of(Pattern pattern, std::optional<Calibration> calibration,
                                             const Configuration& configuration, std::size_t lanes);
 
-  /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of this name
+  /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of this name;
+  ///         kInvalidArgument: a box that no camera sees
   [[nodiscard]] Result<> check(const ScanRequest& request) const;
   /// Checks that clouds can be in the robot's base. @errors kNotFound: no hand-eye calibration; kMismatch: it was
   /// measured with another calibration of the scanner
@@ -120,6 +122,8 @@ struct ScanSetup {
   /// @param base_from_flange  the robot's pose; counts if the scanner is on its arm
   [[nodiscard]] std::optional<RigidTransform> base_from_rig(
       const std::optional<RigidTransform>& base_from_flange) const;
+  /// @errors kInvalidArgument: a box that no camera sees
+  [[nodiscard]] Result<> check_box(const CloudPart& wanted) const;
   /// @errors kNotFound: no camera of this name
   [[nodiscard]] Result<> check_camera(const std::string& name) const;
   /// @param name  of a camera; empty: the first

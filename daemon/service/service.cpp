@@ -254,9 +254,10 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
   state_.configuration.other_hardware = configuration->other_hardware;
   state_.configuration.decode = configuration->decode;
   state_.configuration.frame = configuration->frame;
+  state_.configuration.cloud = configuration->cloud;
   state_.configuration.cameras = with_exposures_of(state_.configuration.cameras, configuration->cameras);
   state_.configuration.scan.timeout_ms = configuration->scan.timeout_ms;
-  for (const char* table : {"pattern", "calibration", "decode"}) {
+  for (const char* table : {"pattern", "calibration", "decode", "cloud"}) {
     state_.configuration.given[table] = configuration->given.value(table, nlohmann::json::object());
   }
   state_.configuration.given.erase("frame");

@@ -118,6 +118,18 @@ ConfigurationTable frame() {
         R"(The file that slsctl hand-eye wrote, hand_eye.yml. Empty: none, and only "rig" is possible.)"}}};
 }
 
+ConfigurationTable cloud() {
+  return {
+      "cloud",
+      "",
+      {{{{"box", "[]"}},
+        "Measure within this box alone: x, y and z of its least corner, then of the other, in mm in the frame of the "
+        "first camera. Empty: everything. A request may choose otherwise, here and below."},
+       {{{"voxel_mm", "0.0", {}, "0", "1000"}},
+        "Keep one point, the most certain, of each cube of this side, {voxel_mm}. 0: keep all."},
+       {{{"stride", "1", {}, "1", "64"}}, R"(With "pixels": keep the pixels of every Nth row and column, {stride}.)"}}};
+}
+
 ConfigurationTable scan() {
   return {
       "scan",
@@ -179,7 +191,7 @@ ConfigurationTable black_box() {
 std::vector<ConfigurationTable> configuration_tables() {
   std::vector<ConfigurationTable> tables{pattern(), projector()};
   for (ConfigurationTable& table : camera_tables()) tables.push_back(std::move(table));
-  for (const auto make : {calibration, decode, frame, scan, server, black_box}) tables.push_back(make());
+  for (const auto make : {calibration, decode, cloud, frame, scan, server, black_box}) tables.push_back(make());
   return tables;
 }
 

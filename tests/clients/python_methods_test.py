@@ -259,7 +259,8 @@ class Types(unittest.TestCase):
     def test_of_settings_have_the_keys_of_the_configuration(self):
         text = (ROOT / "config/slsd.toml").read_text(encoding="utf-8")
         tables = dict(re.findall(r"^\[(\w+)\]\n(.*?)(?=^\[|\Z)", text, re.M | re.S))
-        for table, of in (("decode", slsd.DecodeSettings), ("calibration", slsd.CalibrationSettings), ("pattern", slsd.PatternSettings)):
+        for table, of in (("decode", slsd.DecodeSettings), ("calibration", slsd.CalibrationSettings), ("pattern", slsd.PatternSettings),
+                          ("cloud", slsd.CloudSettings)):
             part = tables[table].split("\n# [[camera]]")[0]
             keys = set(re.findall(r"^(?:# )?(\w+) = ", part, re.M))
             self.assertEqual(set(typing.get_type_hints(of)), keys)

@@ -36,6 +36,14 @@ class DecodeSettings(TypedDict, total=False):
     correspond: _Method
 
 
+class CloudSettings(TypedDict, total=False):
+    """Keys of the table [cloud]: the part of the scene to measure."""
+
+    box: Optional[List[float]]
+    voxel_mm: Optional[float]
+    stride: Optional[int]
+
+
 class CalibrationSettings(TypedDict, total=False):
     """Keys of the table [calibration]. The file is on the scanner's machine, and the service reads it as its user."""
 

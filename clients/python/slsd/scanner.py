@@ -18,7 +18,7 @@ import numpy.typing as npt
 from .channel import GRACE_S, Answer, Body, Channel, subscribed
 from .cloud import Cloud, read_ply
 from .errors import InvalidRequest, NotFound, ProtocolError, ScannerError
-from .options import CalibrationSettings, CameraSettings, Code, DecodeSettings, Density, PatternSettings, Picture
+from .options import CalibrationSettings, CameraSettings, CloudSettings, Code, DecodeSettings, Density, PatternSettings, Picture
 
 DEFAULT_SOCKET = "/run/slsd/slsd.sock"
 _TIMEOUT_MAX_S = 600.0  # of the protocol
@@ -81,7 +81,8 @@ class Scanner:
              texture: bool = False, ambient: bool = False, picture: bool = False, camera: str | None = None,
              frames: bool = False, shared: bool = True, why: bool = False, preset: str | None = None,
              coordinate_frame: Literal["rig", "robot_base"] | None = None, robot_pose: Sequence[float] | None = None,
-             poses: str | None = None) -> Cloud:
+             poses: str | None = None, box: Sequence[float] | None = None, voxel_mm: float | None = None,
+             stride: int | None = None) -> Cloud:
         """Takes one scan.
 
         density  "symbols": a point for each symbol of the pattern; "pixels": one for each camera pixel; None: as
@@ -100,11 +101,16 @@ class Scanner:
         coordinate_frame  the frame of the points; None: as configured
         robot_pose  the pose of the robot whose arm carries the scanner, in its own numbers
         poses    how the robot writes them: "ur", "kuka", "abb", ...
+        box      measures within this box alone: x, y and z of its least corner, then of the other, in mm in the frame of
+                 the first camera; (): everything; None: as configured, here and below
+        voxel_mm keeps one point, the most certain, of each cube of this side
+        stride   keeps the pixels of every Nth row and column
         """
         params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
                          camera=camera, frames="raw" if frames else None, why=why, coordinate_frame=coordinate_frame,
-                         robot_pose=None if robot_pose is None else [float(each) for each in robot_pose], poses=poses)
+                         robot_pose=None if robot_pose is None else [float(each) for each in robot_pose], poses=poses,
+                         voxel_mm=voxel_mm, stride=stride, box=None if box is None else [float(number) for number in box])
         answer = self._call("scan", params, timeout_s)
         cloud = read_ply(_need(answer, "the cloud"), answer.result)
         for event, data in answer.events:
@@ -207,18 +213,18 @@ class Scanner:
         return self._call("settings", {}, GRACE_S).result
 
     def set(self, *, decode: DecodeSettings | None = None, calibration: CalibrationSettings | None = None,
-            pattern: PatternSettings | None = None, camera: Mapping[str, CameraSettings] | None = None
-            ) -> dict[str, Any]:
+            pattern: PatternSettings | None = None, camera: Mapping[str, CameraSettings] | None = None,
+            cloud: CloudSettings | None = None) -> dict[str, Any]:
         """Changes settings at once, and keeps them over restarts. A value of None takes a setting back.
 
-        decode, calibration, pattern   keys of these tables of the configuration
+        decode, calibration, pattern, cloud   keys of these tables of the configuration
         camera   exposure and gain of each camera, by its name
 
         Returns `set` (all settings now set), `not_kept` (None, or why a restart forgets them) and `needs_restart`.
         If the service refuses any setting, all stay as they were.
         """
-        return self._call("set", _params(decode=decode, calibration=calibration, pattern=pattern, camera=camera),
-                          _RELOAD_MAX_S).result
+        return self._call("set", _params(decode=decode, calibration=calibration, pattern=pattern, camera=camera,
+                                           cloud=cloud), _RELOAD_MAX_S).result
 
     def exposure(self, camera: str | None = None, *, exposure_us: float | None = None, gain_db: float | None = None
                  ) -> Exposure:

@@ -93,11 +93,16 @@ void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& re
 
 /// A point for each pixel of a camera, from the symbols of its frame.
 DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& setup, std::size_t lane,
-                         std::size_t camera, const SceneLight& light, bool next_of_stream, ScanResult& result) {
+                         std::size_t camera, const SceneLight& light, const CloudPart& part, bool next_of_stream,
+                         ScanResult& result) {
   DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
   DecodedSymbols symbols = decoder.symbols();
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may come from the quotient image
   const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
+  std::optional<PixelRectangle> pixels;
+  if (part.box)
+    pixels = pixels_of_box(*part.box, calibrated, setup.depth_min_mm, setup.depth_max_mm).value_or(PixelRectangle{});
+  mapper.set_part(pixels);
   DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
                                  : mapper.measure(frame, light.full, symbols, *setup.crew);
   DenseView view{std::exchange(map, setup.dense->spare_map()),
@@ -132,6 +137,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   const std::size_t pictured = setup.camera_index(request.camera);
   StageClock clock;
   const Crew::Turn turn(*setup.crew);
+  const CloudPart part = request.part.value_or(setup.part);
   auto dense = request.formats.dense() ? setup.dense->cloud() : nullptr;
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     clock.start();
@@ -153,7 +159,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     if (dense) {
       const auto dense_begin = steady_clock::now();
       dense->views.push_back(
-          measure_pixels(set.frames[i].image(), decoder, setup, lane, i, light, request.of_stream, result));
+          measure_pixels(set.frames[i].image(), decoder, setup, lane, i, light, part, request.of_stream, result));
       const auto took = steady_clock::now() - dense_begin;
       result.dense_time += took, result.decode_time += took;
     }
@@ -164,6 +170,10 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     result.picture_png = std::move(*picture);
   }
   if (dense) {
+    const auto dense_begin = steady_clock::now();
+    keep_part(dense->views, part);
+    const auto took = steady_clock::now() - dense_begin;
+    result.dense_time += took, result.decode_time += took;
     dense->scan_id = result.cloud.scan_id, dense->time = result.cloud.time, dense->frame = result.cloud.frame;
     result.dense = std::move(dense);
   }
@@ -175,6 +185,10 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     const auto sigma_mm = setup.calibration->report.depth_sigma_mm(median_of(std::move(depths_mm)));
     if (sigma_mm) result.cloud.sigma_calibration_mm = static_cast<float>(*sigma_mm);
   }
+  const std::size_t decoded = result.cloud.points.size();
+  keep_part(result.cloud.points, part);
+  if (decoded > 0 && result.cloud.points.empty())
+    result.empty = "none of the " + std::to_string(decoded) + " points lies within the box: make it larger, or move it";
   if (auto kept = keep_frames(set, setup, request.frames, result); !kept) return tl::unexpected(kept.error());
   return result;
 }

@@ -202,6 +202,16 @@ Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameC
   return reply;
 }
 
+// The part of the cloud that a request asks for; what it does not name is as configured.
+CloudOptions read_part(ParamReader& reader, const ServiceState& state) {
+  constexpr double kFarMm = 1e6;
+  CloudOptions part = state.configuration.cloud;
+  part.box = reader.numbers("box", 6, -kFarMm, kFarMm).value_or(part.box);
+  part.voxel_mm = reader.number("voxel_mm", 0, 1000).value_or(part.voxel_mm);
+  part.stride = reader.integer("stride", part.stride, 1, 64);
+  return part;
+}
+
 // A request for a scan, read from its parameters.
 struct AskedScan {
   CloudForm form;
@@ -227,6 +237,7 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
   asked.request.formats = CloudFormats::only(asked.form);
   asked.request.gone = session.gone();
   asked.preset = reader.text("preset");
+  const CloudOptions part = read_part(reader, state);
   if (auto error = reader.error()) return tl::unexpected(*error);
   if (auto refused = refused_frame(asked.form, pose, *state.scanner.setup(), Delivery::kOnce))
     return tl::unexpected(*refused);
@@ -235,6 +246,9 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
     if (!base_from_flange) return tl::unexpected(base_from_flange.error());
     asked.request.base_from_flange = *base_from_flange;
   }
+  if (auto valid = part.validate(); !valid)
+    return tl::unexpected(invalid_params("\"" + valid.error().where + "\" " + valid.error().message));
+  asked.request.part = part.part();
   return asked;
 }
 

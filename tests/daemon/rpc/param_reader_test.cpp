@@ -2,6 +2,11 @@
 // Copyright the slsd authors
 #include "daemon/rpc/param_reader.hpp"
 
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include <gmock/gmock.h>
 
 namespace slsd {
@@ -70,6 +75,28 @@ TEST(ParamReader, ReadsListsOfFiniteNumbers) {
     ASSERT_TRUE(refusing.error()) << value;
     EXPECT_THAT(refusing.error()->message, HasSubstr("must be a list of 1 to 3 finite numbers"));
   }
+}
+
+TEST(ParamReader, TakesSoManyNumbersOrNone) {
+  const auto read = [](const json& value) {
+    const json params{{"box", value}};
+    ParamReader reader(params);
+    auto numbers = reader.numbers("box", 3, -10, 10);
+    return std::pair(numbers, reader.error() ? reader.error()->message : std::string());
+  };
+  EXPECT_EQ(read({-10, 2.5, 10}).first, (std::vector<double>{-10, 2.5, 10}));
+  EXPECT_EQ(read(json::array()).first, std::vector<double>());
+  for (const json& value :
+       {json({1, 2}), json({1, 2, 3, 4}), json({1, 2, 10.1}), json({-10.1, 2, 3}), json({1, 2, "3"}),
+        json({1, 2, nullptr}), json(1), json(), json("1"), json{{"a", 1}, {"b", 2}, {"c", 3}}}) {
+    EXPECT_EQ(read(value).first, std::nullopt) << value;
+    EXPECT_THAT(read(value).second, HasSubstr("\"box\" must be 3 numbers from -10.0 to 10.0, or an empty list"))
+        << value;
+  }
+  const json nothing = json::object();
+  ParamReader reader(nothing);
+  EXPECT_EQ(reader.numbers("box", 3, -10, 10), std::nullopt);
+  EXPECT_FALSE(reader.error());
 }
 
 }  // namespace
