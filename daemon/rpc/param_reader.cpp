@@ -53,28 +53,17 @@ std::optional<double> ParamReader::number(const char* name, double low, double h
   return std::nullopt;
 }
 
-std::vector<double> ParamReader::numbers(const char* name, std::size_t count_max) {
-  const auto* value = find(name);
-  if (value == nullptr) return {};
-  const auto is_finite = [](const nlohmann::json& each) {
-    return each.is_number() && std::isfinite(each.get<double>());
-  };
-  if (value->is_array() && !value->empty() && value->size() <= count_max && std::ranges::all_of(*value, is_finite))
-    return value->get<std::vector<double>>();
-  refuse(name, "a list of 1 to " + std::to_string(count_max) + " finite numbers");
-  return {};
-}
-
-std::optional<std::vector<double>> ParamReader::numbers(const char* name, std::size_t count, double low, double high) {
+std::optional<std::vector<double>> ParamReader::numbers(const char* name, const NumberList& list) {
   const auto* value = find(name);
   if (value == nullptr) return std::nullopt;
   const auto fits = [&](const nlohmann::json& each) {
-    return each.is_number() && each.get<double>() >= low && each.get<double>() <= high;
+    return each.is_number() && each.get<double>() >= list.low && each.get<double>() <= list.high;
   };
-  if (value->is_array() && (value->empty() || value->size() == count) && std::ranges::all_of(*value, fits))
+  if (value->is_array() && value->size() >= list.count_min && value->size() <= list.count_max &&
+      std::ranges::all_of(*value, fits))
     return value->get<std::vector<double>>();
-  refuse(name, std::to_string(count) + " numbers from " + nlohmann::json(low).dump() + " to " +
-                   nlohmann::json(high).dump() + ", or an empty list");
+  refuse(name, "a list of " + std::to_string(list.count_min) + " to " + std::to_string(list.count_max) +
+                   " numbers from " + nlohmann::json(list.low).dump() + " to " + nlohmann::json(list.high).dump());
   return std::nullopt;
 }
 

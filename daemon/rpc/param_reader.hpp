@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -17,6 +18,12 @@ namespace slsd {
 /// The longest text of a parameter, except file contents.
 inline constexpr std::size_t kMaxTextBytes = 1024;
 
+/// What a list of numbers may hold.
+struct NumberList {
+  std::size_t count_min, count_max;
+  double low, high;
+};
+
 /// Reads a request's parameters by name. Missing ones keep their defaults; the first error is kept.
 /// @thread thread-bound
 class ParamReader {
@@ -28,13 +35,10 @@ class ParamReader {
   [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
   /// The number of that name; empty if missing.
   [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
-  /// List of so many numbers, or an empty list; nothing if missing.
-  [[nodiscard]] std::optional<std::vector<double>> numbers(const char* name, std::size_t count, double low,
-                                                           double high);
   /// A text of at most this many bytes. It may contain control characters: use printable() before quoting it.
   [[nodiscard]] std::string text(const char* name, std::size_t bytes_max = kMaxTextBytes);
-  /// A list of at most this many finite numbers; empty if missing.
-  [[nodiscard]] std::vector<double> numbers(const char* name, std::size_t count_max);
+  /// The list of numbers of that name; nothing if missing.
+  [[nodiscard]] std::optional<std::vector<double>> numbers(const char* name, const NumberList& list);
   /// One of the words; the first if missing.
   [[nodiscard]] std::string choice(const char* name, std::initializer_list<std::string_view> words);
 

@@ -127,8 +127,8 @@ struct AskedPose {
 };
 
 AskedPose read_asked_pose(ParamReader& reader) {
-  constexpr std::size_t kNumbersMax = 16;
-  std::vector<double> numbers = reader.numbers("robot_pose", kNumbersMax);
+  constexpr NumberList kPose{.count_min = 1, .count_max = 16, .low = -1e9, .high = 1e9};
+  std::vector<double> numbers = reader.numbers("robot_pose", kPose).value_or(std::vector<double>());
   return {std::move(numbers), reader.text("poses")};
 }
 
@@ -204,9 +204,9 @@ Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameC
 
 // The part of the cloud that a request asks for; what it does not name is as configured.
 CloudOptions read_part(ParamReader& reader, const ServiceState& state) {
-  constexpr double kFarMm = 1e6;
+  constexpr NumberList kBox{.count_min = 0, .count_max = 6, .low = -1e6, .high = 1e6};
   CloudOptions part = state.configuration.cloud;
-  part.box = reader.numbers("box", 6, -kFarMm, kFarMm).value_or(part.box);
+  part.box = reader.numbers("box", kBox).value_or(part.box);
   part.voxel_mm = reader.number("voxel_mm", 0, 1000).value_or(part.voxel_mm);
   part.stride = reader.integer("stride", part.stride, 1, 64);
   return part;
