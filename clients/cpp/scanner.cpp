@@ -190,6 +190,8 @@ Cloud Scanner::scan(const ScanOptions& options) {
   if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose;
   if (!options.poses.empty()) params["poses"] = options.poses;
   if (!options.box.empty()) params["box"] = options.box;
+  if (!options.plane.empty()) params["plane"] = options.plane;
+  if (!options.box_frame.empty()) params["box_frame"] = options.box_frame;
   if (options.voxel_mm) params["voxel_mm"] = *options.voxel_mm;
   if (options.stride) params["stride"] = *options.stride;
   if (options.picture) params["picture"] = true;

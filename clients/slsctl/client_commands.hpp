@@ -42,6 +42,8 @@ struct Failure;
 [[nodiscard]] int top_command(const ClientOptions& options);
 /// Changes keys of the service without a restart.
 [[nodiscard]] int set_command(const ClientOptions& options);
+/// Measures the plane on which most points of a scan lie, and makes the service subtract it.
+[[nodiscard]] int plane_command(const ClientOptions& options);
 /// Saves, lists, shows, uses or deletes presets.
 [[nodiscard]] int preset_command(const ClientOptions& options);
 /// Shows the keys that are set, and the source of each.

@@ -35,6 +35,9 @@ struct ClientOptions {
   std::vector<double> robot_pose;           ///< scan: the robot's numbers; empty: none
   std::string pose_notation;                ///< scan: how the robot writes them
   std::vector<double> box;                  ///< scan: corners of the part to measure, mm; empty: as configured
+  std::string box_frame;                    ///< scan: "rig" or "robot_base"; empty: as configured
+  bool set = false;                         ///< plane: subtract it from now on
+  std::optional<double> margin_mm;          ///< plane: drop points up to this far before it
   std::optional<double> voxel_mm;           ///< scan
   std::optional<int> stride;                ///< scan
   bool normals = false;                     ///< scan: normals of pixels

@@ -129,6 +129,7 @@ json scan_parameters(const ClientOptions& options, const std::string& density) {
   if (!density.empty()) params["density"] = density;
   if (!options.camera.empty()) params["camera"] = options.camera;
   if (!options.box.empty()) params["box"] = options.box;
+  if (!options.box_frame.empty()) params["box_frame"] = options.box_frame;
   if (options.voxel_mm) params["voxel_mm"] = *options.voxel_mm;
   if (options.stride) params["stride"] = *options.stride;
   if (!options.preset.empty()) params["preset"] = options.preset;

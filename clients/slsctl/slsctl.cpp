@@ -75,6 +75,8 @@ void add_scan(CLI::App& app, ClientOptions& options) {
       ->delimiter(',')
       ->expected(6)
       ->type_name("X,Y,Z,X,Y,Z");
+  scan->add_option("--box-frame", options.box_frame, "the frame of the box (as configured)")
+      ->check(one_of({"rig", "robot_base"}));
   scan->add_option("--voxel-mm", options.voxel_mm, "keep one point, the most certain, of each cube of this side")
       ->check(between(0, 1000))
       ->type_name("MM");
@@ -265,6 +267,20 @@ std::string wrong_preset(const ClientOptions& options, const std::string& comman
   return options.preset.empty() ? "NAME is missing: preset " + options.action + " NAME" : "";
 }
 
+void add_plane(CLI::App& app, ClientOptions& options) {
+  CLI::App* plane = add_command(app, kSetUp, "plane", "measure the plane in view, such as a table, and subtract it",
+                                "  slsctl plane\n"
+                                "  slsctl plane --set --margin-mm 2\n"
+                                "  slsctl set cloud.plane=default\n");
+  plane->add_flag("--set", options.set, "from now on, drop all points on the plane or behind it");
+  plane
+      ->add_option("--margin-mm", options.margin_mm,
+                   "also drop points up to this far before the plane (5 times the scatter of its points)")
+      ->check(between(0, 1000))
+      ->type_name("MM");
+  add_timeout(plane, options);
+}
+
 void add_preset(CLI::App& app, ClientOptions& options) {
   CLI::App* preset = add_command(app, kSetUp, "preset", "store the settings that are set by name, and use them again",
                                  "  slsctl preset save part-a\n"
@@ -294,6 +310,7 @@ void add_commands(CLI::App& app, ClientOptions& options) {
   add_project(app, options);
   add_image(app, options, kSetUp, "frame", "write a camera's frame", "  slsctl frame left.png --camera left\n");
   add_settings(app, options);
+  add_plane(app, options);
   add_preset(app, options);
   add_image(app, options, kDiagnose, "preview", "scan, and write the frame with the decoded symbols drawn in",
             "  slsctl preview decoded.png\n");
@@ -308,6 +325,7 @@ int run(const std::string& command, const ClientOptions& options) {
   if (command == "watch") return slsd::watch_command(options);
   if (command == "metrics") return slsd::metrics_command(options);
   if (command == "set") return slsd::set_command(options);
+  if (command == "plane") return slsd::plane_command(options);
   if (command == "preset") return slsd::preset_command(options);
   if (command == "settings") return slsd::settings_command(options);
   if (command == "bundle") return slsd::bundle_command(options);

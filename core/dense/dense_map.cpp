@@ -7,7 +7,7 @@ namespace slsd {
 std::string_view to_string(DensePixel pixel) {
   constexpr std::array<std::string_view, kDensePixelCount> kNames{
       "measured",        "not_reached", "no_support",  "saturated", "out_of_depth_range", "occluded", "unlit",
-      "small_component", "at_an_edge",  "outside_box", "thinned"};
+      "small_component", "at_an_edge",  "outside_box", "thinned",   "behind_plane"};
   return kNames[static_cast<std::size_t>(pixel)];
 }
 

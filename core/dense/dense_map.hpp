@@ -27,8 +27,9 @@ enum class DensePixel : std::uint8_t {
   kAtAnEdge,        ///< closer to a hole or a jump than dense_prune_px
   kOutsideBox,      ///< outside the box to measure
   kThinned,         ///< another point stands for it: stride, voxel_mm
+  kBehindPlane,     ///< on the plane to subtract, or behind it
 };
-inline constexpr int kDensePixelCount = 11;
+inline constexpr int kDensePixelCount = 12;
 /// Change of depth between adjacent pixels, as a share of the depth, above which there is a jump to another surface.
 inline constexpr float kDepthJump = 0.004F;
 

@@ -74,6 +74,7 @@ void keep_part(std::vector<CloudPoint>& points, const CloudPart& part) {
     return Eigen::Vector3f(point.x, point.y, point.z).cast<double>();
   };
   if (part.box) std::erase_if(points, [&](const CloudPoint& point) { return !part.box->contains(place(point)); });
+  if (part.side) std::erase_if(points, [&](const CloudPoint& point) { return !part.side->contains(place(point)); });
   if (part.voxel_mm <= 0) return;
   CubesOfPoints cubes(part.voxel_mm);
   std::vector<char> dropped(points.size(), 0);
@@ -84,15 +85,17 @@ void keep_part(std::vector<CloudPoint>& points, const CloudPart& part) {
 }
 
 void keep_part(std::span<DenseView> views, const CloudPart& part) {
-  if (!part.box && part.voxel_mm <= 0 && part.stride <= 1) return;
+  const bool needs_place = part.box || part.side || part.voxel_mm > 0;
+  if (!needs_place && part.stride <= 1) return;
   CubesOfPoints cubes(std::max(part.voxel_mm, 1e-6));
   std::size_t first = 0;  // index of the view's first pixel among those of all views
   for (DenseView& view : views) {
     for_each_measured(view.map, [&](std::size_t pixel, int x, int y) {
       if (x % part.stride != 0 || y % part.stride != 0) return view.map.drop(pixel, DensePixel::kThinned);
-      if (!part.box && part.voxel_mm <= 0) return;
+      if (!needs_place) return;
       const Eigen::Vector3d place = place_of(view, x, y, view.map.depth_mm[pixel]);
       if (part.box && !part.box->contains(place)) return view.map.drop(pixel, DensePixel::kOutsideBox);
+      if (part.side && !part.side->contains(place)) return view.map.drop(pixel, DensePixel::kBehindPlane);
       if (part.voxel_mm <= 0) return;
       auto other = cubes.offer(place, view.map.sigma_mm[pixel], first + pixel);
       if (!other) return;

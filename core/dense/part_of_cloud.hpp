@@ -8,6 +8,7 @@
 
 #include "core/cloud/cloud.hpp"
 #include "core/dense/dense_cloud.hpp"
+#include "core/geometry/half_space.hpp"
 #include "core/geometry/measured_box.hpp"
 
 namespace slsd {
@@ -15,10 +16,9 @@ namespace slsd {
 /// The part of a scan that its user wants.
 struct CloudPart {
   std::optional<MeasuredBox> box = {};  ///< empty: all
+  std::optional<HalfSpace> side = {};   ///< of a plane, in the rig's frame; empty: both
   double voxel_mm = 0;                  ///< keeps the most certain point of each cube of this side; 0: all
   int stride = 1;                       ///< of pixels: keeps every Nth row and column
-
-  friend bool operator==(const CloudPart&, const CloudPart&) = default;
 };
 
 /// Drops the points outside the part. Of several points in one cube, keeps the one of the least sigma; of equals, the

@@ -17,12 +17,12 @@ using Directions = Eigen::AlignedBox2d;  // x/z and y/z, undistorted
 
 // The corners of the box between two planes of depth: those of the box itself, and of its edges on the planes.
 Directions directions_of(const MeasuredBox& box, const CalibratedCamera& camera, double near_mm, double far_mm) {
-  const RigidTransform camera_from_rig = camera.rig_from_camera.inverse();
+  const RigidTransform camera_from_frame = box.frame_from_rig.after(camera.rig_from_camera).inverse();
   std::array<Eigen::Vector3d, 8> corners;
   for (int i = 0; i < 8; ++i) {
     corners[i] =
-        camera_from_rig * Eigen::Vector3d((i & 1 ? box.most : box.least).x(), (i & 2 ? box.most : box.least).y(),
-                                          (i & 4 ? box.most : box.least).z());
+        camera_from_frame * Eigen::Vector3d((i & 1 ? box.most : box.least).x(), (i & 2 ? box.most : box.least).y(),
+                                            (i & 4 ? box.most : box.least).z());
   }
   Directions seen;
   const auto see = [&](const Eigen::Vector3d& point) { seen.extend(Eigen::Vector2d(point.head<2>() / point.z())); };

@@ -11,14 +11,16 @@
 
 namespace slsd {
 
-/// The part of the scene to measure: a box along the axes of the rig's frame, millimetres.
+/// The part of the scene to measure: a box along the axes of a frame, millimetres.
 struct MeasuredBox {
   Eigen::Vector3d least, most;
+  RigidTransform frame_from_rig = {};
 
+  /// @param point  in the rig's frame
   [[nodiscard]] bool contains(const Eigen::Vector3d& point) const {
-    return (point.array() >= least.array()).all() && (point.array() <= most.array()).all();
+    const Eigen::Vector3d place = frame_from_rig * point;
+    return (place.array() >= least.array()).all() && (place.array() <= most.array()).all();
   }
-  friend bool operator==(const MeasuredBox&, const MeasuredBox&) = default;
 };
 
 /// A rectangle of pixels; right and bottom are one past the last.

@@ -83,6 +83,8 @@ void read_keys(TableReader& reader, FrameOptions& options) {
 
 void read_keys(TableReader& reader, CloudOptions& options) {
   reader.read("box", options.box);
+  reader.read("plane", options.plane);
+  reader.choose("box_frame", options.box_frame, kCoordinateFrames);
   reader.read("voxel_mm", options.voxel_mm);
   reader.read("stride", options.stride);
 }

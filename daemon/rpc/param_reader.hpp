@@ -18,7 +18,7 @@ namespace slsd {
 /// The longest text of a parameter, except file contents.
 inline constexpr std::size_t kMaxTextBytes = 1024;
 
-/// What a list of numbers may hold.
+/// Limits of a list of numbers.
 struct NumberList {
   std::size_t count_min, count_max;
   double low, high;

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <future>
+#include <string_view>
+
+#include <fmt/format.h>
 
 #include "core/calibration_file/calibration_file.hpp"
 #include "core/exposure/light_levels.hpp"
@@ -186,7 +189,13 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::siz
   auto hand_eye = configured_hand_eye(configuration);
   if (!hand_eye) return tl::unexpected(hand_eye.error());
   auto setup = of(std::move(*pattern), std::move(*calibration), configuration, lanes);
-  if (setup) setup->hand_eye = std::move(*hand_eye);
+  if (!setup) return setup;
+  setup->hand_eye = std::move(*hand_eye);
+  // A box that moves with the robot is checked with each pose.
+  const bool moves = setup->cloud.in_base() && setup->hand_eye && setup->hand_eye->mounted == Mounted::kArm;
+  if (moves || !setup->calibration) return setup;
+  const auto part = setup->part_of({});
+  if (!part) return fail(part.error().code, part.error().message, "[cloud] box");
   return setup;
 }
 
@@ -199,7 +208,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   }
   setup.image = draw_pattern(setup.pattern);
   setup.decode = configuration.decode;
-  setup.part = configuration.cloud.part();
+  setup.cloud = configuration.cloud;
   setup.depth_min_mm = configuration.decode.depth_min_mm;
   setup.depth_max_mm = configuration.decode.depth_max_mm;
   if (!setup.calibration) return setup;
@@ -210,8 +219,6 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   if (!first) return tl::unexpected(first.error());
   for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));
   if (lanes > 0) setup.lanes.push_back(std::move(*first));
-  if (const auto seen = setup.check_box(setup.part); !seen)
-    return fail(seen.error().code, seen.error().message, "[cloud] box");
   if (setup.decode.density != Density::kPixels) return setup;
   // Makes the first scan wait for little but the field of its blur.
   for (std::size_t lane = 0; lane < setup.lanes.size(); ++lane) {
@@ -227,7 +234,7 @@ Result<> ScanSetup::check(const ScanRequest& request) const {
   if (!calibration) {
     return fail(ErrorCode::kNotFound, "no calibration: calibrate, or set [calibration] file in the configuration");
   }
-  if (auto seen = check_box(request.part.value_or(part)); !seen) return seen;
+  if (auto part = part_of(request); !part) return tl::unexpected(part.error());
   return check_camera(request.camera);
 }
 
@@ -249,17 +256,33 @@ std::optional<RigidTransform> ScanSetup::base_from_rig(const std::optional<Rigid
   return base_from_flange->after(hand_eye->mount_from_rig);
 }
 
-Result<> ScanSetup::check_box(const CloudPart& wanted) const {
-  if (!wanted.box || lanes.empty()) return {};
+Result<CloudPart> ScanSetup::part_of(const ScanRequest& request) const {
+  const CloudOptions& wanted = request.part ? *request.part : cloud;
+  if (!wanted.in_base()) return seen_part(wanted, {});
+  if (auto possible = check_robot_base(); !possible) return tl::unexpected(possible.error());
+  const auto base_from_here = base_from_rig(request.base_from_flange);
+  if (base_from_here) return seen_part(wanted, *base_from_here);
+  return fail(
+      ErrorCode::kInvalidArgument,
+      "box and plane are in the robot's base, and the scanner is on its arm: scan with the robot's pose, or set "
+      "box_frame to \"rig\"",
+      "box");
+}
+
+Result<CloudPart> ScanSetup::seen_part(const CloudOptions& wanted, const RigidTransform& frame_from_rig) const {
+  CloudPart part = wanted.part(frame_from_rig);
+  if (!part.box || lanes.empty()) return part;
   const bool seen = std::ranges::any_of(lanes.front(), [&](const Decoder& decoder) {
     const CalibratedCamera& camera = calibration->cameras[decoder.camera_index()];
-    return pixels_of_box(*wanted.box, camera, depth_min_mm, depth_max_mm).has_value();
+    return pixels_of_box(*part.box, camera, depth_min_mm, depth_max_mm).has_value();
   });
-  if (seen) return {};
-  return fail(ErrorCode::kInvalidArgument,
-              "no camera sees the box between depth_min_mm and depth_max_mm: its corners are in the frame of the first "
-              "camera, x to the right, y down, z forward, in mm",
-              "box");
+  if (seen) return part;
+  const std::string_view frame =
+      wanted.in_base() ? "the robot's base" : "the frame of the first camera, x to the right, y down, z forward";
+  return fail(
+      ErrorCode::kInvalidArgument,
+      fmt::format("no camera sees the box between depth_min_mm and depth_max_mm: its corners are in {}, in mm", frame),
+      "box");
 }
 
 Result<> ScanSetup::check_camera(const std::string& name) const {

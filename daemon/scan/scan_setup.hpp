@@ -95,7 +95,7 @@ struct ScanSetup {
   std::vector<std::string> camera_formats = {};  ///< configured formats, such as "Mono12"; an empty text if not set
   std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
   DecodeOptions decode = {};
-  CloudPart part = {};  ///< unless a request asks for another
+  CloudOptions cloud = {};  ///< unless a request asks for another part
   std::unique_ptr<DenseMappers> dense = std::make_unique<DenseMappers>();
   std::unique_ptr<Crew> crew = std::make_unique<Crew>(Crew::helpers_here());  ///< helps the lanes
   std::unique_ptr<EmptyClouds> empty_clouds = std::make_unique<EmptyClouds>();
@@ -113,7 +113,7 @@ struct ScanSetup {
                                             const Configuration& configuration, std::size_t lanes);
 
   /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of this name;
-  ///         kInvalidArgument: a box that no camera sees
+  ///         errors of part_of()
   [[nodiscard]] Result<> check(const ScanRequest& request) const;
   /// Checks that clouds can be in the robot's base. @errors kNotFound: no hand-eye calibration; kMismatch: it was
   /// measured with another calibration of the scanner
@@ -122,8 +122,10 @@ struct ScanSetup {
   /// @param base_from_flange  the robot's pose; counts if the scanner is on its arm
   [[nodiscard]] std::optional<RigidTransform> base_from_rig(
       const std::optional<RigidTransform>& base_from_flange) const;
-  /// @errors kInvalidArgument: a box that no camera sees
-  [[nodiscard]] Result<> check_box(const CloudPart& wanted) const;
+  /// The part of the cloud that a request asks for, in the rig's frame.
+  /// @errors of check_robot_base(); kInvalidArgument: a box that no camera sees, or in the robot's base without its
+  /// pose
+  [[nodiscard]] Result<CloudPart> part_of(const ScanRequest& request) const;
   /// @errors kNotFound: no camera of this name
   [[nodiscard]] Result<> check_camera(const std::string& name) const;
   /// @param name  of a camera; empty: the first
@@ -134,6 +136,10 @@ struct ScanSetup {
   [[nodiscard]] double full_level_of(std::size_t camera, std::span<const GreyView> frames) const;
 
   [[nodiscard]] ScanFiles files() const;
+
+ private:
+  // The part, if a camera sees its box.
+  [[nodiscard]] Result<CloudPart> seen_part(const CloudOptions& wanted, const RigidTransform& frame_from_rig) const;
 };
 
 // The setup of the scans under way; shared, because a reload may replace it meanwhile.

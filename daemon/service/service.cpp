@@ -257,11 +257,10 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
   state_.configuration.cloud = configuration->cloud;
   state_.configuration.cameras = with_exposures_of(state_.configuration.cameras, configuration->cameras);
   state_.configuration.scan.timeout_ms = configuration->scan.timeout_ms;
-  for (const char* table : {"pattern", "calibration", "decode", "cloud"}) {
-    state_.configuration.given[table] = configuration->given.value(table, nlohmann::json::object());
+  for (const char* table : {"pattern", "calibration", "decode", "frame", "cloud"}) {
+    state_.configuration.given.erase(table);
+    if (configuration->given.contains(table)) state_.configuration.given[table] = configuration->given[table];
   }
-  state_.configuration.given.erase("frame");
-  if (configuration->given.contains("frame")) state_.configuration.given["frame"] = configuration->given["frame"];
   note_exposures(state_.configuration.given, configuration->given);
   // The next start reads this file; the configuration itself belongs to the administrator.
   const bool changed = settings != state_.settings;

@@ -123,8 +123,13 @@ ConfigurationTable cloud() {
       "cloud",
       "",
       {{{{"box", "[]"}},
-        "Measure within this box alone: x, y and z of its least corner, then of the other, in mm in the frame of the "
-        "first camera. Empty: everything. A request may choose otherwise, here and below."},
+        "Measure within this box alone: x, y and z of its least corner, then of the other, in mm. Empty: everything. A "
+        "request may choose otherwise, here and below."},
+       {{{"plane", "[]"}},
+        "Drop the points on this plane or behind it: x, y and z of its unit normal, and its offset along the normal in "
+        "mm. slsctl plane measures it. Empty: keep them."},
+       {{{"box_frame", R"("rig")"}},
+        "The frame of box and plane: \"rig\", the first camera's, or \"robot_base\", by [frame] hand_eye."},
        {{{"voxel_mm", "0.0", {}, "0", "1000"}},
         "Keep one point, the most certain, of each cube of this side, {voxel_mm}. 0: keep all."},
        {{{"stride", "1", {}, "1", "64"}}, R"(With "pixels": keep the pixels of every Nth row and column, {stride}.)"}}};

@@ -3,6 +3,7 @@
 # Copyright the slsd authors
 """A part of the scene: the box of the configuration or of a request, one point to a cube, every Nth row and column; and
 boxes that no camera sees, which change nothing."""
+import json
 import pathlib
 import tempfile
 import unittest
@@ -46,7 +47,7 @@ class Box(unittest.TestCase):
         cls.symbols = places(cls.client.call("scan")[1])
 
     def setUp(self):
-        self.addCleanup(self.call, "set", cloud={"box": None, "voxel_mm": None, "stride": None})
+        self.addCleanup(self.call, "set", cloud={"box": None, "plane": None, "voxel_mm": None, "stride": None})
 
     def call(self, method, **params):
         return self.client.call(method, **params)[0]
@@ -138,6 +139,7 @@ class Box(unittest.TestCase):
     def test_that_is_no_box_is_refused(self):
         swapped = BOX[3:] + BOX[:3]
         for params in ({"box": BOX[:5]}, {"box": swapped}, {"box": [*BOX[:5], 1e7]}, {"box": ["a"] * 6}, {"box": 3}, {"voxel_mm": -1}, {"voxel_mm": 1e4},
+                       {"plane": [0, 0, 1]}, {"plane": [0, 0, 2, 5]}, {"plane": [0, 0, 1, 1e7]}, {"box_frame": "world"},
                        {"stride": 0}, {"stride": 65}, {"stride": 1.5}):
             code, message = self.refused("scan", **params)
             self.assertEqual(code, INVALID_PARAMS, message)
@@ -145,6 +147,34 @@ class Box(unittest.TestCase):
             code, message = self.refused("set", cloud=params)
             self.assertIn(next(iter(params)), message)
         self.assertEqual(len(self.points(**PIXEL_SCAN)), len(self.pixels))
+
+    def test_of_a_plane_drops_what_is_on_it_or_behind(self):
+        plane = [0.6, 0.0, -0.8, -1600.0]
+        def side(points):
+            return points["x"] * 0.6 - points["z"] * 0.8 > -1600
+        self.assert_same_points(self.points(plane=plane, **PIXEL_SCAN), self.pixels[side(self.pixels)])
+        scan = self.call("scan", plane=plane, **PIXEL_SCAN)
+        self.assertEqual(scan["pixels"]["behind_plane"], np.count_nonzero(~side(self.pixels)))
+        scan = self.call("scan", plane=[0, 0, -1, -100])
+        self.assertEqual(scan["points"], 0)
+        self.assertIn("before the plane", scan["empty"])
+
+    def test_of_a_plane_that_was_measured(self):
+        words = ["--socket", str(self.service.socket)]
+        shown = slsctl(*words, "plane", "--json")
+        self.assertEqual(shown.returncode, 0, shown.stderr)
+        found = json.loads(shown.stdout)
+        normal = np.linalg.svd(self.symbols - self.symbols.mean(axis=0))[2][2]  # without our code
+        self.assertGreater(abs(normal @ found["plane"][:3]), 1 - 1e-5)
+        self.assertLess(abs(found["plane"][3] - found["margin_mm"] - found["plane"][:3] @ self.symbols.mean(axis=0)), 0.5)
+        self.assertNotIn("cloud", self.call("settings")["set"])
+        done = slsctl(*words, "plane", "--set")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("It is in force", done.stdout)
+        self.assertLess(self.call("scan")["points"], len(self.symbols) / 50)
+        again = json.loads(slsctl(*words, "plane", "--json", "--margin-mm", "3").stdout)  # of what is there, not of what is left
+        self.assertEqual((again["points"], again["margin_mm"]), (len(self.symbols), 3))
+        self.call("set", cloud={"plane": None})
 
     def test_belongs_to_a_preset(self):
         with tempfile.TemporaryDirectory(prefix="slsd-test-") as state, Service(environment={"STATE_DIRECTORY": state}) as service, service.client() as client:

@@ -151,8 +151,8 @@ class RobotFrame(unittest.TestCase):
             self.refused(client, '"robot_pose" needs "poses"', robot_pose=POSE_UR)
             self.refused(client, '"poses" is no notation of poses: ur, ', robot_pose=POSE_UR, poses="scara")
             self.refused(client, '"robot_pose" has 5 numbers instead of 6', robot_pose=POSE_UR[:5], poses="ur")
-            self.refused(client, '"robot_pose" must be a list of 1 to 16 finite', robot_pose=[None] * 6, poses="ur")
-            self.refused(client, "is for points in the robot's base", coordinate_frame="rig", **pose)
+            self.refused(client, '"robot_pose" must be a list of 1 to 16 numbers', robot_pose=[None] * 6, poses="ur")
+            self.refused(client, "is for points or a box in the robot's base", coordinate_frame="rig", **pose)
             metres_as_mm = "puts the flange 0.7733 mm from the robot's base"
             self.refused(client, metres_as_mm, robot_pose=POSE_UR, poses="ur-pendant")
             in_mm = [1000 * each for each in POSE_UR[:3]] + POSE_UR[3:]
@@ -162,6 +162,39 @@ class RobotFrame(unittest.TestCase):
             client.call("subscribe", rate_hz=10)  # in the rig's frame
             wait_until(lambda: self.next_cloud(client), "a cloud")
             self.assertNotIn("base_from_rig", self.event)
+
+    def test_box_and_plane_in_the_robots_base(self):
+        for mounted, pose in (("cell", {}), ("arm", {"robot_pose": POSE_UR, "poses": "ur"})):
+            with self.subTest(mounted), self.service(mounted) as service, service.client() as client:
+                points = read_ply(client.call("scan", timeout_ms=60000, **pose)[1])[0]
+                at = places(points)
+                middle = numpy.median(at, axis=0)
+                box = [*(middle - 150), *(middle + 90)]
+                params = {"box": box, "box_frame": "robot_base", "timeout_ms": 60000, **pose}
+                inside = ((at >= box[:3]) & (at <= box[3:])).all(axis=1)
+                self.assertTrue(50 < numpy.count_nonzero(inside) < len(at) - 50)
+                numpy.testing.assert_array_equal(places(read_ply(client.call("scan", **params)[1])[0]), at[inside])
+                rig = read_ply(client.call("scan", coordinate_frame="rig", **params)[1])[0]
+                self.assertEqual(len(rig), numpy.count_nonzero(inside))
+                pixels = {"density": "pixels", **params}
+                whole = read_ply(client.call("scan", density="pixels", timeout_ms=60000, **pose)[1])[0]
+                of_box = ((places(whole) >= box[:3]) & (places(whole) <= box[3:])).all(axis=1)
+                self.assertLess(abs(len(read_ply(client.call("scan", **pixels)[1])[0]) - numpy.count_nonzero(of_box)), 20)
+                normal = numpy.array([0.48, -0.6, 0.64])
+                above = at @ normal > normal @ middle
+                plane = read_ply(client.call("scan", plane=[*normal, float(normal @ middle)], box_frame="robot_base", timeout_ms=60000, **pose)[1])[0]
+                numpy.testing.assert_array_equal(places(plane), at[above])
+                self.refused(client, "no camera sees the box .* in the robot's base", **{**params, "box": [*(middle + 9000), *(middle + 9100)]})
+                if mounted == "arm":
+                    self.refused(client, 'add the robot\'s pose .* "box_frame": "rig"', coordinate_frame="rig", box=box, box_frame="robot_base")
+                client.call("set", cloud={"box": box, "box_frame": "robot_base"})
+                if mounted == "arm":
+                    self.refused(client, "no poses come with a stream: .* box and plane are in the robot's base", "subscribe", coordinate_frame="rig")
+                self.assertEqual(client.call("scan", timeout_ms=60000, **pose)[0]["points"], numpy.count_nonzero(inside))
+
+    def test_box_in_the_robots_base_needs_its_place(self):
+        with Service() as service, service.client() as client:
+            self.refused(client, "the scanner's place in the robot's base is unknown", box=[0, 0, 0, 1, 1, 1], box_frame="robot_base")
 
     def test_slsctl(self):
         pose = ",".join(map(str, POSE_UR))
@@ -189,7 +222,7 @@ class RobotFrame(unittest.TestCase):
             self.assertIn("the scanner is on the robot's arm", done.stderr)
             done = scan(f"{folder}/none.ply", "--poses", "ur", "--robot-pose=0.4,nan,0.6,0,0,1")
             self.assertEqual(done.returncode, 1)
-            self.assertIn("finite numbers", done.stderr)
+            self.assertIn("1 to 16 numbers", done.stderr)
             self.assertEqual(scan("--robot-pose=0.4,0.2,0.6,0,0,1").returncode, 2)  # --poses is missing
             self.assertFalse((pathlib.Path(folder) / "none.ply").exists())
             done = slsctl("--socket", service.socket, "record", f"{folder}/kept", "--frames", 1, "--clouds")

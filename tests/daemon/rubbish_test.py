@@ -14,7 +14,7 @@ from service import Service, wait_until
 
 LOG_LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z (debug|info|warning|error|critical) ")
 # Every text that a client can send: the parameters of every method that takes some.
-TEXTS = {"scan": ["format", "transport", "camera", "frames", "preset", "box"], "preview": ["camera"], "frame": ["format", "camera"],
+TEXTS = {"scan": ["format", "transport", "camera", "frames", "preset", "box", "plane", "box_frame"], "preview": ["camera"], "frame": ["format", "camera"],
          "pattern": ["format"], "project": ["picture", "png"], "subscribe": ["format"], "status": [], "settings": [],
          "reload": [], "preset": ["action", "name"], "presets": ["name"], "set": ["decode", "camera", "pattern", "calibration", "cloud"],
          "calibrate": ["action", "code"], "unsubscribe": []}

@@ -40,6 +40,8 @@ class CloudSettings(TypedDict, total=False):
     """Keys of the table [cloud]: the part of the scene to measure."""
 
     box: Optional[List[float]]
+    plane: Optional[List[float]]
+    box_frame: Optional[Literal["rig", "robot_base"]]
     voxel_mm: Optional[float]
     stride: Optional[int]
 

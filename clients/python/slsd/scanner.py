@@ -81,7 +81,8 @@ class Scanner:
              texture: bool = False, ambient: bool = False, picture: bool = False, camera: str | None = None,
              frames: bool = False, shared: bool = True, why: bool = False, preset: str | None = None,
              coordinate_frame: Literal["rig", "robot_base"] | None = None, robot_pose: Sequence[float] | None = None,
-             poses: str | None = None, box: Sequence[float] | None = None, voxel_mm: float | None = None,
+             poses: str | None = None, box: Sequence[float] | None = None, plane: Sequence[float] | None = None,
+             box_frame: Literal["rig", "robot_base"] | None = None, voxel_mm: float | None = None,
              stride: int | None = None) -> Cloud:
         """Takes one scan.
 
@@ -101,16 +102,18 @@ class Scanner:
         coordinate_frame  the frame of the points; None: as configured
         robot_pose  the pose of the robot whose arm carries the scanner, in its own numbers
         poses    how the robot writes them: "ur", "kuka", "abb", ...
-        box      measures within this box alone: x, y and z of its least corner, then of the other, in mm in the frame of
-                 the first camera; (): everything; None: as configured, here and below
+        box      measures within this box alone: x, y and z of its least corner, then of the other, in mm; ():
+                 everything; None: as configured, here and below
+        plane    drops what lies on this plane or behind it: x, y and z of its unit normal, and its offset along it, mm
+        box_frame  the frame of box and plane
         voxel_mm keeps one point, the most certain, of each cube of this side
         stride   keeps the pixels of every Nth row and column
         """
         params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
                          camera=camera, frames="raw" if frames else None, why=why, coordinate_frame=coordinate_frame,
-                         robot_pose=None if robot_pose is None else [float(each) for each in robot_pose], poses=poses,
-                         voxel_mm=voxel_mm, stride=stride, box=None if box is None else [float(number) for number in box])
+                         robot_pose=_numbers(robot_pose), poses=poses,
+                         box=_numbers(box), plane=_numbers(plane), box_frame=box_frame, voxel_mm=voxel_mm, stride=stride)
         answer = self._call("scan", params, timeout_s)
         cloud = read_ply(_need(answer, "the cloud"), answer.result)
         for event, data in answer.events:
@@ -319,6 +322,10 @@ class Scanner:
 
 def _params(**values: Any) -> dict[str, Any]:
     return {name: value for name, value in values.items() if value is not None and value is not False}
+
+
+def _numbers(values: Sequence[float] | None) -> list[float] | None:
+    return None if values is None else [float(value) for value in values]
 
 
 def _milliseconds(seconds: float | None) -> int | None:

@@ -14,7 +14,7 @@
 #include <Eigen/SVD>
 
 #include "core/board/tie.hpp"
-#include "core/calibrate/verify/plane_fit.hpp"
+#include "core/geometry/plane_fit.hpp"
 
 namespace slsd {
 namespace {

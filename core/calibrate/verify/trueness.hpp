@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/calibrate/observe/observations.hpp"
-#include "core/calibrate/verify/plane_fit.hpp"
+#include "core/geometry/plane_fit.hpp"
 #include "core/geometry/lens.hpp"
 
 namespace slsd {

@@ -13,7 +13,7 @@
 #include <Eigen/QR>
 
 #include "core/calibrate/solve/point_residuals.hpp"
-#include "core/calibrate/verify/plane_fit.hpp"
+#include "core/geometry/plane_fit.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/geometry/triangulate.hpp"
 

@@ -137,7 +137,9 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   const std::size_t pictured = setup.camera_index(request.camera);
   StageClock clock;
   const Crew::Turn turn(*setup.crew);
-  const CloudPart part = request.part.value_or(setup.part);
+  const auto wanted = setup.part_of(request);
+  if (!wanted) return tl::unexpected(wanted.error());
+  const CloudPart& part = *wanted;
   auto dense = request.formats.dense() ? setup.dense->cloud() : nullptr;
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     clock.start();
@@ -188,7 +190,8 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   const std::size_t decoded = result.cloud.points.size();
   keep_part(result.cloud.points, part);
   if (decoded > 0 && result.cloud.points.empty())
-    result.empty = "none of the " + std::to_string(decoded) + " points lies within the box: make it larger, or move it";
+    result.empty = "none of the " + std::to_string(decoded) + " points lies " +
+                   (part.box ? "within the box: make it larger, or move it" : "before the plane: move it, or turn it");
   if (auto kept = keep_frames(set, setup, request.frames, result); !kept) return tl::unexpected(kept.error());
   return result;
 }

@@ -13,7 +13,7 @@
 
 #include "core/cloud/cloud.hpp"
 #include "core/decode/decoding.hpp"
-#include "core/dense/part_of_cloud.hpp"
+#include "daemon/configuration/cloud_options.hpp"
 #include "daemon/scan/cloud/cloud_files.hpp"
 #include "drivers/camera/camera.hpp"
 #include "drivers/camera/frame.hpp"
@@ -81,7 +81,7 @@ struct ScanRequest {
   std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
   bool why = false;                         ///< the picture shows each rejected region in the colour of its rule
   std::optional<RigidTransform> base_from_flange = {};  ///< the robot's pose at the exposure, if it is known
-  std::optional<CloudPart> part = {};                   ///< empty: as configured
+  std::optional<CloudOptions> part = {};                ///< empty: as configured
   bool of_stream = false;  ///< one of a stream: pixels that do not move reuse earlier measurements
 };
 

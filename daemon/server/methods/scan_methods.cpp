@@ -105,6 +105,12 @@ bool on_arm(const ScanSetup& setup) {
 
 // The form of cloud that a request asks for; without a density or frame, the configured one. No poses come with a
 // stream, so that of a scanner on the arm is in the rig's frame.
+CoordinateFrame read_frame(ParamReader& reader, const char* name, CoordinateFrame otherwise) {
+  const std::string frame = otherwise == CoordinateFrame::kRobotBase ? reader.choice(name, {"robot_base", "rig"})
+                                                                     : reader.choice(name, {"rig", "robot_base"});
+  return frame == "robot_base" ? CoordinateFrame::kRobotBase : CoordinateFrame::kRig;
+}
+
 CloudForm read_form(ParamReader& reader, const ServiceState& state, Delivery delivery) {
   CloudForm form(cloud_format(reader.choice("format", {"ply", "pcd", "tiff"})));
   const bool pixels = state.configuration.decode.density == Density::kPixels;
@@ -114,9 +120,8 @@ CloudForm read_form(ParamReader& reader, const ServiceState& state, Delivery del
   form.normals = reader.boolean("normals", false);
   const bool base = state.configuration.frame.output == CoordinateFrame::kRobotBase &&
                     (delivery == Delivery::kOnce || !on_arm(*state.scanner.setup()));
-  const std::string frame = base ? reader.choice("coordinate_frame", {"robot_base", "rig"})
-                                 : reader.choice("coordinate_frame", {"rig", "robot_base"});
-  form.in_base = frame == "robot_base" && form.format != CloudFormat::kTiff;
+  const auto frame = read_frame(reader, "coordinate_frame", base ? CoordinateFrame::kRobotBase : CoordinateFrame::kRig);
+  form.in_base = frame == CoordinateFrame::kRobotBase && form.format != CloudFormat::kTiff;
   return form;
 }
 
@@ -132,27 +137,40 @@ AskedPose read_asked_pose(ParamReader& reader) {
   return {std::move(numbers), reader.text("poses")};
 }
 
+// What a request wants in the robot's base.
+struct WantedInBase {
+  bool cloud, part;
+
+  [[nodiscard]] bool any() const { return cloud || part; }
+  /// The parameter that says otherwise.
+  [[nodiscard]] std::string_view remedy() const {
+    return cloud ? "\"coordinate_frame\": \"rig\"" : "\"box_frame\": \"rig\"";
+  }
+};
+
 // Refuses a frame that is not possible, and a pose that is missing or useless.
-std::optional<RpcError> refused_frame(CloudForm form, const AskedPose& pose, const ScanSetup& setup,
+std::optional<RpcError> refused_frame(WantedInBase wanted, const AskedPose& pose, const ScanSetup& setup,
                                       Delivery delivery) {
   const bool given = !pose.numbers.empty();
-  if (!form.in_base && given) {
+  if (!wanted.any() && given) {
     return invalid_params(
-        "\"robot_pose\" is for points in the robot's base: leave it out, or ask for \"coordinate_frame\": "
+        "\"robot_pose\" is for points or a box in the robot's base: leave it out, or ask for \"coordinate_frame\": "
         "\"robot_base\"");
   }
-  if (!form.in_base) return std::nullopt;
+  if (!wanted.any()) return std::nullopt;
   if (auto possible = setup.check_robot_base(); !possible) return rpc_error(possible.error());
   if (!on_arm(setup) && given)
     return invalid_params("the scanner stands in the cell, where no pose moves it: leave \"robot_pose\" out");
   if (!on_arm(setup) || given) return std::nullopt;
   if (delivery == Delivery::kStream) {
-    return invalid_params(
-        "the scanner is on the robot's arm, and no poses come with a stream: ask for \"coordinate_frame\": \"rig\"");
+    return invalid_params(fmt::format(
+        "the scanner is on the robot's arm, and no poses come with a stream: {} {}",
+        wanted.cloud ? "ask for" : "[cloud] box and plane are in the robot's base; set them with", wanted.remedy()));
   }
   return invalid_params(
-      "the scanner is on the robot's arm: add the robot's pose as \"robot_pose\" and \"poses\", or ask for "
-      "\"coordinate_frame\": \"rig\"");
+      fmt::format("the scanner is on the robot's arm: add the robot's pose as \"robot_pose\" and \"poses\", or ask for "
+                  "{}",
+                  wanted.remedy()));
 }
 
 tl::expected<RigidTransform, RpcError> pose_of(const AskedPose& asked) {
@@ -206,7 +224,10 @@ Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameC
 CloudOptions read_part(ParamReader& reader, const ServiceState& state) {
   constexpr NumberList kBox{.count_min = 0, .count_max = 6, .low = -1e6, .high = 1e6};
   CloudOptions part = state.configuration.cloud;
+  constexpr NumberList kPlane{.count_min = 0, .count_max = 4, .low = -1e6, .high = 1e6};
   part.box = reader.numbers("box", kBox).value_or(part.box);
+  part.plane = reader.numbers("plane", kPlane).value_or(part.plane);
+  part.box_frame = read_frame(reader, "box_frame", part.box_frame);
   part.voxel_mm = reader.number("voxel_mm", 0, 1000).value_or(part.voxel_mm);
   part.stride = reader.integer("stride", part.stride, 1, 64);
   return part;
@@ -239,16 +260,17 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
   asked.preset = reader.text("preset");
   const CloudOptions part = read_part(reader, state);
   if (auto error = reader.error()) return tl::unexpected(*error);
-  if (auto refused = refused_frame(asked.form, pose, *state.scanner.setup(), Delivery::kOnce))
+  if (auto valid = part.validate(); !valid)
+    return tl::unexpected(invalid_params("\"" + valid.error().where + "\" " + valid.error().message));
+  const WantedInBase in_base{asked.form.in_base, part.in_base()};
+  if (auto refused = refused_frame(in_base, pose, *state.scanner.setup(), Delivery::kOnce))
     return tl::unexpected(*refused);
   if (!pose.numbers.empty()) {
     const auto base_from_flange = pose_of(pose);
     if (!base_from_flange) return tl::unexpected(base_from_flange.error());
     asked.request.base_from_flange = *base_from_flange;
   }
-  if (auto valid = part.validate(); !valid)
-    return tl::unexpected(invalid_params("\"" + valid.error().where + "\" " + valid.error().message));
-  asked.request.part = part.part();
+  asked.request.part = part;
   return asked;
 }
 
@@ -345,7 +367,8 @@ void run_subscribe(ServiceState& state, const json& params, Session& session, Re
   const std::optional<double> rate_hz = reader.number("rate_hz", kRateMinHz, kRateMaxHz);
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   if (auto refused = refused_form(form)) return respond(tl::unexpected(*refused));
-  if (auto refused = refused_frame(form, {}, *state.scanner.setup(), Delivery::kStream))
+  if (auto refused = refused_frame({form.in_base, state.configuration.cloud.in_base()}, {}, *state.scanner.setup(),
+                                   Delivery::kStream))
     return respond(tl::unexpected(*refused));
   json result{{"format", to_string(form.format)}};
   if (form.dense()) result["density"] = to_string(form.density);

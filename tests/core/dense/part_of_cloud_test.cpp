@@ -33,6 +33,12 @@ TEST(KeepPart, KeepsThePointsOfTheBox) {
   EXPECT_EQ(points, (std::vector<CloudPoint>{point(0, 0, 500, 1)}));
 }
 
+TEST(KeepPart, KeepsThePointsBeforeThePlane) {
+  std::vector<CloudPoint> points{point(0, 0, 500, 1), point(10, 0, 499, 1), point(0, 0, 501, 1)};
+  keep_part(points, {.side = HalfSpace{-Eigen::Vector3d::UnitZ(), -500}});
+  EXPECT_EQ(points, (std::vector<CloudPoint>{point(10, 0, 499, 1)}));
+}
+
 TEST(KeepPart, KeepsTheMostCertainPointOfEachCube) {
   std::vector<CloudPoint> points{point(1, 1, 501, 0.3F), point(2, 2, 502, 0.1F), point(3, 3, 503, 0.1F),
                                  point(-1, 1, 501, 0.5F), point(11, 1, 501, 0.2F)};
@@ -55,6 +61,13 @@ TEST(KeepPart, KeepsThePixelsOfTheBox) {
   keep_part(views, {.box = MeasuredBox{{15, -5, 900}, {45, 25, 1100}}});
   EXPECT_EQ(views[0].map.count(DensePixel::kMeasured), 3U * 3U);
   EXPECT_EQ(views[0].map.count(DensePixel::kOutsideBox), 70U - 9U);
+}
+
+TEST(KeepPart, KeepsThePixelsBeforeThePlane) {
+  std::vector<DenseView> views{flat_view(10, 7, 1000)};
+  keep_part(views, {.side = HalfSpace{Eigen::Vector3d::UnitX(), 55}});
+  EXPECT_EQ(views[0].map.count(DensePixel::kMeasured), 4U * 7U);
+  EXPECT_EQ(views[0].map.count(DensePixel::kBehindPlane), 6U * 7U);
 }
 
 TEST(KeepPart, SharesCubesBetweenCameras) {

@@ -43,14 +43,18 @@ TEST(PixelsOfBox, CoverEveryPointThatIsSeen) {
                                         .toRotationMatrix();
     from.rig_from_camera.translation = {place(numbers), place(numbers), 0};
     const Eigen::Vector3d least(place(numbers), place(numbers), depth(numbers));
-    const MeasuredBox box{least, least + Eigen::Vector3d(size(numbers), size(numbers), size(numbers))};
+    MeasuredBox box{least, least + Eigen::Vector3d(size(numbers), size(numbers), size(numbers))};
+    if (i % 2 == 1)
+      box.frame_from_rig = {Eigen::AngleAxisd(turn(numbers), Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix(),
+                            {place(numbers) / 10, 20, -30}};
+    const RigidTransform rig_from_frame = box.frame_from_rig.inverse();
     const auto pixels = pixels_of_box(box, from, 400, 2500);
     boxes += pixels.has_value();
     for (int k = 0; k < 200; ++k) {
       const Eigen::Vector3d of_size = box.most - box.least;
-      const Eigen::Vector3d point =
-          box.least +
-          Eigen::Vector3d(share(numbers) * of_size.x(), share(numbers) * of_size.y(), share(numbers) * of_size.z());
+      const Eigen::Vector3d inside(share(numbers) * of_size.x(), share(numbers) * of_size.y(),
+                                   share(numbers) * of_size.z());
+      const Eigen::Vector3d point = rig_from_frame * (box.least + inside);
       ASSERT_TRUE(box.contains(point));
       const Eigen::Vector3d here = from.rig_from_camera.inverse() * point;
       if (here.z() < 400 || here.z() > 2500) continue;

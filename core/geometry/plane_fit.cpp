@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "core/calibrate/verify/plane_fit.hpp"
+#include "core/geometry/plane_fit.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,6 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 
-#include "core/calibrate/solve/point_residuals.hpp"
 #include "core/geometry/robust.hpp"
 
 namespace slsd {
@@ -78,11 +77,12 @@ std::optional<PlaneFit> least_squares(Points points, std::vector<std::size_t> us
 }
 
 std::vector<std::size_t> near(Points points, const PlaneFit& plane) {
-  const std::vector<double> off = offsets(points, plane);
-  const double gate = std::max(kGateMinMm, kGateSigmas * robust_sigma_px(off));
+  std::vector<double> distances = offsets(points, plane);
+  for (double& distance : distances) distance = std::abs(distance);
+  const double gate = std::max(kGateMinMm, kGateSigmas * kSigmaOfMedian * median_of(distances));
   std::vector<std::size_t> used;
-  for (std::size_t i = 0; i < off.size(); ++i) {
-    if (std::abs(off[i]) <= gate) used.push_back(i);
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    if (distances[i] <= gate) used.push_back(i);
   }
   return used;
 }
