@@ -9,9 +9,9 @@
 
 #include <fmt/format.h>
 
-#include "clients/model/read_cloud.hpp"
 #include "clients/model/tidy_mesh.hpp"
 #include "clients/model/volume.hpp"
+#include "core/cloud/read_dense_ply.hpp"
 #include "core/geometry/robust.hpp"
 
 namespace slsd::model {
@@ -60,7 +60,7 @@ ModelBuilder::ModelBuilder(Calibration calibration, const ModelOptions& options)
     : calibration_(std::move(calibration)), options_(options), tracker_(options.step_degrees) {}
 
 Result<Shot> ModelBuilder::read_shot(std::string_view ply) const {
-  const auto points = read_cloud(ply);
+  const auto points = read_dense_ply(ply);
   if (!points) return tl::unexpected(points.error());
   auto images = range_images(*points, calibration_, options_.box);
   if (!images) return tl::unexpected(images.error());

@@ -17,7 +17,7 @@ constexpr double kOffShare = 0.01;
 struct Placed {
   int u, v;
   float depth_mm;
-  const MeasuredPoint* point;
+  const DensePoint* point;
 };
 
 tl::unexpected<Error> other_calibration() {
@@ -26,13 +26,13 @@ tl::unexpected<Error> other_calibration() {
               "calibration and clouds of one recording");
 }
 
-Result<std::vector<Placed>> place(std::span<const MeasuredPoint> points, std::size_t camera,
+Result<std::vector<Placed>> place(std::span<const DensePoint> points, std::size_t camera,
                                   const CalibratedCamera& calibrated, const std::optional<Box>& box) {
   const RigidTransform camera_from_rig = calibrated.rig_from_camera.inverse();
   const Lens& lens = calibrated.lens;
   std::vector<Placed> placed;
   std::size_t off = 0, all = 0;
-  for (const MeasuredPoint& point : points) {
+  for (const DensePoint& point : points) {
     if (point.camera != camera) continue;
     ++all;
     const Eigen::Vector3d in_camera = camera_from_rig * point.place_mm.cast<double>();
@@ -75,10 +75,10 @@ RangeImage crop(const std::vector<Placed>& placed, const CalibratedCamera& camer
 
 }  // namespace
 
-Result<std::vector<RangeImage>> range_images(std::span<const MeasuredPoint> points, const Calibration& calibration,
+Result<std::vector<RangeImage>> range_images(std::span<const DensePoint> points, const Calibration& calibration,
                                              const std::optional<Box>& box) {
   std::vector<RangeImage> images;
-  for (const MeasuredPoint& point : points)
+  for (const DensePoint& point : points)
     if (point.camera >= calibration.cameras.size()) return other_calibration();
   for (std::size_t camera = 0; camera < calibration.cameras.size(); ++camera) {
     const auto placed = place(points, camera, calibration.cameras[camera], box);

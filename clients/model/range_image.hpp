@@ -10,18 +10,11 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "core/cloud/read_dense_ply.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
 
 namespace slsd::model {
-
-/// One point of a dense cloud, in the rig's frame.
-struct MeasuredPoint {
-  Eigen::Vector3f place_mm;
-  float sigma_mm = 0;  ///< one standard deviation along the camera's ray
-  std::uint8_t intensity = 0;
-  std::uint8_t camera = 0;  ///< index in the calibration
-};
 
 /// Measurement of one camera in one frame, cropped to the measured pixels.
 struct RangeImage {
@@ -53,7 +46,7 @@ using Box = Eigen::AlignedBox3f;
 /// @return     an image for each camera that measured something, in the calibration's order
 /// @errors kMismatch: the cloud is not of this calibration
 /// @thread reentrant
-[[nodiscard]] Result<std::vector<RangeImage>> range_images(std::span<const MeasuredPoint> points,
+[[nodiscard]] Result<std::vector<RangeImage>> range_images(std::span<const DensePoint> points,
                                                            const Calibration& calibration,
                                                            const std::optional<Box>& box);
 

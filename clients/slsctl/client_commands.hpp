@@ -35,9 +35,9 @@ struct Failure;
 [[nodiscard]] int bundle_command(const ClientOptions& options);
 /// Starts a calibration with the service's devices and follows it to its end; or shows, ends or cancels one.
 [[nodiscard]] int calibrate_command(const ClientOptions& options);
-/// Replaces this process by slsd-hand-eye with the same command line. It is a separate program, so that slsctl does not
-/// load libraries that only calibrating needs. @param argv  main()'s own. @return only on failure
-[[nodiscard]] int hand_eye_command(const ClientOptions& options, char** argv);
+/// Replaces this process by another program of slsd with the same command line. They are separate, so that slsctl does
+/// not load libraries that only calibrating needs. @param argv  main()'s own. @return only on failure
+[[nodiscard]] int separate_command(const ClientOptions& options, const std::string& program, char** argv);
 /// Shows rates, latencies and states, and refreshes them.
 [[nodiscard]] int top_command(const ClientOptions& options);
 /// Changes keys of the service without a restart.

@@ -9,6 +9,7 @@
 #include "clients/slsctl/client_commands.hpp"
 #include "clients/slsctl/client_options.hpp"
 #include "clients/slsctl/output.hpp"
+#include "clients/usage/datasheet_usage.hpp"
 #include "clients/usage/hand_eye_usage.hpp"
 #include "clients/usage/usage.hpp"
 #include "core/geometry/robot_pose.hpp"
@@ -202,6 +203,11 @@ void add_hand_eye(CLI::App& app, slsd::HandEyeRequest& request) {
   slsd::add_hand_eye_options(*hand_eye, request);
 }
 
+void add_datasheet(CLI::App& app, slsd::DatasheetRequest& request) {
+  CLI::App* datasheet = add_command(app, kSetUp, "datasheet", slsd::kDatasheetPurpose, slsd::kDatasheetExamples);
+  slsd::add_datasheet_options(*datasheet, request);
+}
+
 void add_exposure(CLI::App& app, ClientOptions& options) {
   CLI::App* exposure = add_command(app, kSetUp, "exposure", "measure the scene's light, and propose exposure and gain",
                                    "  slsctl exposure\n  slsctl exposure --camera left --gain-max-db 6\n");
@@ -366,17 +372,21 @@ int main(int argc, char** argv) {
   add_commands(app, options);
   slsd::HandEyeRequest hand_eye;  // checked here, carried out by slsd-hand-eye
   add_hand_eye(app, hand_eye);
+  slsd::DatasheetRequest datasheet;  // likewise, by slsd-datasheet
+  add_datasheet(app, datasheet);
   const auto arguments = without_help_command(argc, argv);
   std::string command;
   const auto check = [&] {
     command = app.get_subcommands().front()->get_name();
     auto wrong = wrong_frames(options);
     if (wrong.empty()) wrong = wrong_preset(options, command);
+    if (wrong.empty() && command == "datasheet") wrong = slsd::wrong_datasheet(datasheet);
     if (wrong.empty()) wrong = slsd::wrong_outputs(options, command);
     if (!wrong.empty()) throw CLI::ValidationError(wrong);
   };
   if (const auto ended = slsd::parse_usage(app, static_cast<int>(arguments.size()), arguments.data(), check))
     return *ended;
-  if (command == "hand-eye") return slsd::hand_eye_command(options, argv);
+  if (command == "hand-eye") return slsd::separate_command(options, slsd::kHandEyeProgram, argv);
+  if (command == "datasheet") return slsd::separate_command(options, slsd::kDatasheetProgram, argv);
   return slsd::finish(options, run(command, options));
 }

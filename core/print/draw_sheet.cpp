@@ -2,8 +2,6 @@
 // Copyright the slsd authors
 #include "core/print/draw_sheet.hpp"
 
-#include <cairo-pdf.h>
-#include <cairo-svg.h>
 #include <cairo.h>
 
 #include <algorithm>
@@ -12,20 +10,18 @@
 #include <numbers>
 
 #include "core/board/board_ink.hpp"
+#include "core/print/vector_file.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr double kPointsToMm = 72 / 25.4;
 constexpr int kMaxSidePx = 32767;  // largest side of Cairo's images
 constexpr double kTextHeightMm = 3;
 constexpr double kNumberHeightMm = 2.2;
 constexpr double kTextBelowRulerMm = 9.5;
 constexpr double kLineMm = 0.12;
-constexpr const char* kTypeface = "@cairo:";  // built into Cairo: independent of a machine's fonts
 
 using Surface = std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)>;
-using Pen = std::unique_ptr<cairo_t, decltype(&cairo_destroy)>;
 
 // One path for all shapes, so that no seam shows between the rectangles of a marker.
 void draw_ink(cairo_t* pen, const Board& board) {
@@ -96,50 +92,15 @@ void draw(cairo_t* pen, const Sheet& sheet) {
   draw_text(pen, sheet);
 }
 
-cairo_status_t append(void* bytes, const unsigned char* from, unsigned count) {
-  static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(from), count);
-  return CAIRO_STATUS_SUCCESS;
-}
-
-tl::unexpected<Error> refuse(cairo_status_t status) {
-  return fail(ErrorCode::kIo, std::string("cannot draw the sheet: ") + cairo_status_to_string(status));
-}
-
-Result<> draw_on(cairo_surface_t* surface, double scale, const Sheet& sheet) {
-  const Pen pen(cairo_create(surface), cairo_destroy);
-  cairo_scale(pen.get(), scale, scale);
-  draw(pen.get(), sheet);
-  if (const auto status = cairo_status(pen.get())) return refuse(status);
-  return {};
-}
-
-// A file's last bytes come when its surface is finished; the pixels of an image are then gone.
-Result<std::string> draw_file(cairo_surface_t* surface, double scale, const Sheet& sheet, const std::string& bytes) {
-  const auto drawn = draw_on(surface, scale, sheet);
-  if (!drawn) return tl::unexpected(drawn.error());
-  cairo_surface_finish(surface);
-  if (const auto status = cairo_surface_status(surface)) return refuse(status);
-  return bytes;
-}
-
 }  // namespace
 
 Result<std::string> sheet_pdf(const Sheet& sheet) {
-  std::string bytes;
-  const Surface surface(cairo_pdf_surface_create_for_stream(append, &bytes, sheet.paper.width_mm * kPointsToMm,
-                                                            sheet.paper.height_mm * kPointsToMm),
-                        cairo_surface_destroy);
-  cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_TITLE, to_string(sheet.board).c_str());
-  return draw_file(surface.get(), kPointsToMm, sheet, bytes);
+  return draw_pdf({{sheet.paper.width_mm, sheet.paper.height_mm}, to_string(sheet.board)},
+                  [&](cairo_t* pen) { draw(pen, sheet); });
 }
 
 Result<std::string> sheet_svg(const Sheet& sheet) {
-  std::string bytes;
-  const Surface surface(
-      cairo_svg_surface_create_for_stream(append, &bytes, sheet.paper.width_mm, sheet.paper.height_mm),
-      cairo_surface_destroy);
-  cairo_svg_surface_set_document_unit(surface.get(), CAIRO_SVG_UNIT_MM);
-  return draw_file(surface.get(), 1, sheet, bytes);
+  return draw_svg({sheet.paper.width_mm, sheet.paper.height_mm}, [&](cairo_t* pen) { draw(pen, sheet); });
 }
 
 Result<Grey8> sheet_image(const Sheet& sheet, double dpi) {
@@ -151,7 +112,7 @@ Result<Grey8> sheet_image(const Sheet& sheet, double dpi) {
   Grey8 image(static_cast<int>(width), static_cast<int>(height));
   const Surface surface(cairo_image_surface_create(CAIRO_FORMAT_A8, image.width(), image.height()),
                         cairo_surface_destroy);
-  const auto drawn = draw_on(surface.get(), dpi / 25.4, sheet);
+  const auto drawn = draw_on(surface.get(), dpi / 25.4, [&](cairo_t* pen) { draw(pen, sheet); });
   if (!drawn) return tl::unexpected(drawn.error());
   cairo_surface_flush(surface.get());
   const unsigned char* ink = cairo_image_surface_get_data(surface.get());

@@ -19,7 +19,7 @@ PAGES = {
     "Use": {"docs/tasks.md": "Tasks", "docs/configuration.md": "Configuration", "docs/dense.md": "Dense clouds", "docs/model.md": "Models", "docs/formats.md": "File formats",
             "docs/protocol.md": "Protocol", "clients/python/README.md": "Python", "clients/cpp/README.md": "C++",
             "docs/examples.md": "Examples", "docs/controllers.md": "Controllers", "docs/ros.md": "ROS 2", "clients/ros/README.md": "ROS 2 launch file",
-            "docs/robot.md": "Robots", "docs/fleet.md": "Many scanners"},
+            "docs/robot.md": "Robots", "docs/datasheet.md": "Data sheet", "docs/fleet.md": "Many scanners"},
     "Run": {"docs/supervision.md": "Supervision", "docs/metrics.md": "Metrics"},
     "Understand": {"docs/decoder.md": "The decoder", "docs/reasons.md": "Reasons", "docs/alphabet.md": "The alphabet", "docs/arrays.md": "The arrays",
                    "docs/architecture.md": "Architecture", "docs/glossary.md": "Glossary", "docs/developing.md": "Developing",

@@ -15,7 +15,7 @@ from service import BIN, Service, slsctl, slsd
 
 WRONG_CONFIGURATION = 78
 COMMANDS = {"scan", "record", "status", "watch", "top", "metrics", "calibrate", "hand-eye", "exposure", "light", "project", "frame", "set", "settings",
-            "plane", "preset", "preview", "pattern", "bundle"}
+            "datasheet", "plane", "preset", "preview", "pattern", "bundle"}
 
 
 class Slsd(unittest.TestCase):

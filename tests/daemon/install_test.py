@@ -88,6 +88,7 @@ class Install(unittest.TestCase):
         install("/usr", str(self.root))
         for file in ("usr/bin/slsd", "usr/bin/slsctl", "usr/bin/slsd-web", "usr/libexec/slsd/slsd-calibrate", "usr/libexec/slsd/slsd-picture",
                      "usr/libexec/slsd/slsd-hand-eye",
+                     "usr/libexec/slsd/slsd-datasheet",
                      *(f"usr/lib/systemd/system/{unit}" for unit in UNITS), "usr/share/man/man8/slsd-web.8", "usr/bin/slsd-tcp", "usr/share/man/man8/slsd-tcp.8",
                      "usr/lib/sysusers.d/slsd.conf", "usr/lib/systemd/catalog/slsd.catalog", "usr/lib/udev/rules.d/60-slsd.rules",
                      "usr/share/bash-completion/completions/slsctl", "etc/slsd/slsd.toml",

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/calibrate/observe/observations.hpp"
-#include "core/geometry/plane_fit.hpp"
 #include "core/geometry/lens.hpp"
+#include "core/geometry/plane_fit.hpp"
 
 namespace slsd {
 

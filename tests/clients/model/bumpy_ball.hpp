@@ -59,8 +59,8 @@ inline RigidTransform rig_from_object(double turn_degrees, double tilt_degrees =
 
 /// A scan of the object. The errors along the rays have `sigma_mm` and are alike over some pixels, as those of dense
 /// clouds.
-inline std::vector<MeasuredPoint> measure(const Distance& distance, const RigidTransform& rig_from_object,
-                                          float sigma_mm, unsigned seed) {
+inline std::vector<DensePoint> measure(const Distance& distance, const RigidTransform& rig_from_object, float sigma_mm,
+                                       unsigned seed) {
   constexpr int kAlikePx = 6;
   const Lens lens = test_calibration().cameras[0].lens;
   std::mt19937 random(seed);
@@ -81,7 +81,7 @@ inline std::vector<MeasuredPoint> measure(const Distance& distance, const RigidT
   const RigidTransform object_from_rig = rig_from_object.inverse();
   const Eigen::Matrix3f rotation = object_from_rig.rotation.cast<float>();
   const Eigen::Vector3f camera = object_from_rig.translation.cast<float>();
-  std::vector<MeasuredPoint> points;
+  std::vector<DensePoint> points;
   for (int y = 0; y < lens.height_px; ++y) {
     for (int x = 0; x < lens.width_px; ++x) {
       const Eigen::Vector3d ray = lens.undistort(Eigen::Vector2d(x, y)).homogeneous().normalized();

@@ -21,10 +21,10 @@ TEST(Volume, MeansFramesByTheirSigmas) {
   // One frame is off by a millimetre, and says so.
   const auto shifted = [](float by_mm, float sigma_mm) {
     auto points = measure(bumpy_ball, rig_from_object(0), 0.001F, 1);
-    for (MeasuredPoint& point : points) point.place_mm.z() += by_mm, point.sigma_mm = sigma_mm;
-    std::erase_if(points, [](const MeasuredPoint& point) { return point.place_mm.head<2>().norm() > 15; });
+    for (DensePoint& point : points) point.place_mm.z() += by_mm, point.sigma_mm = sigma_mm;
+    std::erase_if(points, [](const DensePoint& point) { return point.place_mm.head<2>().norm() > 15; });
     // Back onto the rays.
-    for (MeasuredPoint& point : points) point.place_mm.head<2>() *= point.place_mm.z() / (point.place_mm.z() - by_mm);
+    for (DensePoint& point : points) point.place_mm.head<2>() *= point.place_mm.z() / (point.place_mm.z() - by_mm);
     return make_shot(*range_images(points, test_calibration(), std::nullopt));
   };
   volume.add(shifted(0, 0.1F), {});

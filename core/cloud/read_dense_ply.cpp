@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/read_cloud.hpp"
+#include "core/cloud/read_dense_ply.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 
 #include <fmt/format.h>
 
-namespace slsd::model {
+namespace slsd {
 namespace {
 
 /// Offsets of a record's fields.
@@ -81,27 +81,27 @@ Number number_at(const char* record, std::size_t offset) {
 
 }  // namespace
 
-Result<std::vector<MeasuredPoint>> read_cloud(std::string_view bytes) {
+Result<std::vector<DensePoint>> read_dense_ply(std::string_view bytes) {
   const auto layout = take_header(bytes);
   if (!layout) return fail(ErrorCode::kMalformed, "is not a cloud that slsd wrote as PLY");
   if (layout->symbols)
     return fail(ErrorCode::kUnsupported,
-                "has a point for each symbol; a model needs one for each pixel: set [decode] density = \"pixels\" in "
+                "has a point for each symbol; one for each pixel is needed: set [decode] density = \"pixels\" in "
                 "slsd.toml, and record again");
   if (!layout->rig)
     return fail(ErrorCode::kUnsupported,
-                "has its points in the robot's base; a model needs them in the scanner's frame: scan with "
+                "has its points in the robot's base; they are needed in the scanner's frame: scan with "
                 "--coordinate-frame rig");
   const bool complete = std::ranges::all_of(layout->offsets, [](const auto& offset) { return offset.has_value(); });
   if (!complete) return fail(ErrorCode::kMalformed, "is not a dense cloud: it lacks sigma_mm, intensity or camera");
   if (bytes.size() / layout->record_bytes < layout->points)
     return fail(ErrorCode::kMalformed,
                 fmt::format("is cut: it has {} of {} points", bytes.size() / layout->record_bytes, layout->points));
-  std::vector<MeasuredPoint> points;
+  std::vector<DensePoint> points;
   points.reserve(layout->points);
   for (std::size_t i = 0; i < layout->points; ++i) {
     const char* const record = bytes.data() + i * layout->record_bytes;
-    MeasuredPoint point;
+    DensePoint point;
     for (int axis = 0; axis < 3; ++axis) point.place_mm[axis] = number_at<float>(record, *layout->offsets[axis]);
     point.sigma_mm = number_at<float>(record, *layout->offsets[3]);
     point.intensity = number_at<std::uint8_t>(record, *layout->offsets[4]);
@@ -113,4 +113,4 @@ Result<std::vector<MeasuredPoint>> read_cloud(std::string_view bytes) {
   return points;
 }
 
-}  // namespace slsd::model
+}  // namespace slsd

@@ -7,13 +7,12 @@
 
 #include "clients/slsctl/client_commands.hpp"
 #include "clients/slsctl/report.hpp"
-#include "clients/usage/hand_eye_usage.hpp"
 #include "drivers/system/own_program.hpp"
 
 namespace slsd {
 
-int hand_eye_command(const ClientOptions& options, char** argv) {
-  const auto program = find_own_program(kHandEyeProgram);
+int separate_command(const ClientOptions& options, const std::string& program_name, char** argv) {
+  const auto program = find_own_program(program_name);
   ::execv(program.c_str(), argv);
   const bool missing = errno == ENOENT || errno == ENOTDIR;
   const Error error{missing ? ErrorCode::kNotFound : ErrorCode::kIo,
