@@ -19,14 +19,14 @@ namespace {
 
 using Kind = DriftParameter::Kind;
 
-constexpr double kCornersMin = 0.8;  // share of the board's points
+constexpr double kSeenShareMin = 0.8;  // share of the board's points
 constexpr std::size_t kSymbolsMin = 100;
 constexpr double kLitMin = 0.7;                           // share of the board's width, and of its height, with symbols
-constexpr double kOutlyingSigmas = 5;                     // beyond which a point is outlying
+constexpr double kOutlyingPointSigmas = 5;                // beyond which a point is outlying
 constexpr double kOutlyingMax = 0.3;                      // share of them
-constexpr double kSigmaMinPx = 0.005;                     // no estimator is better than this
+constexpr double kLeastSigmaPx = 0.005;                   // no estimator is better than this
 constexpr double kCornerMaxPx = 0.3, kSymbolMaxPx = 0.6;  // noise beyond which the model does not fit
-constexpr double kBentShare = 0.002;                      // of the longer side
+constexpr double kBentShareOfSide = 0.002;                // of the longer side
 constexpr double kBentSquared = 30;                       // the same in deviations, squared, of three terms
 constexpr double kClearlyLikelier = 10;                   // logarithm of a ratio of probabilities
 constexpr double kDoubtful = 3;                           // the same, below which both explanations count
@@ -96,7 +96,7 @@ double mark_outlying(Observations& looks, const RigModel& rig, const LookNoise& 
   for (std::size_t pose = 0; pose < looks.poses.size(); ++pose) {
     for (PoseView& view : looks.poses[pose].views) {
       const ViewResiduals residuals = residuals_of(view, rig, rig.rig_from_board[pose]);
-      const double limit = kOutlyingSigmas * std::sqrt(2.0);
+      const double limit = kOutlyingPointSigmas * std::sqrt(2.0);
       for (std::size_t i = 0; i < view.corners.size(); ++i)
         view.corners[i].outlying = !(residuals.corners_px[i].norm() < limit * noise.corner_px);
       for (std::size_t i = 0; i < view.symbols.size(); ++i) {
@@ -111,7 +111,7 @@ double mark_outlying(Observations& looks, const RigModel& rig, const LookNoise& 
 
 Result<> check_view_of(const PoseView& view, const std::string& camera, const Board& board) {
   const auto points = static_cast<std::size_t>(board.point_count());
-  if (static_cast<double>(view.corners.size()) < kCornersMin * static_cast<double>(points)) {
+  if (static_cast<double>(view.corners.size()) < kSeenShareMin * static_cast<double>(points)) {
     return fail(
         ErrorCode::kNotFound,
         fmt::format("only {} of the board's {} points are in view: show the whole board", view.corners.size(), points),
@@ -175,12 +175,12 @@ Result<> check_flat(const DriftFit& fit, const Board& board) {
   }
   const double longer_mm = std::max(board.width_mm(), board.height_mm());
   const double squared = terms.dot(fit.shape_covariance.ldlt().solve(terms));
-  if (high - low < kBentShare * longer_mm || squared < kBentSquared) return {};
+  if (high - low < kBentShareOfSide * longer_mm || squared < kBentSquared) return {};
   return fail(
       ErrorCode::kImpossible,
       fmt::format("the board is bent by {:.2f} mm over its {:.0f} mm, and a correction needs a flat one (at most "
                   "{:.2f} mm): lay it on something flat, or glue it to glass",
-                  high - low, longer_mm, kBentShare * longer_mm));
+                  high - low, longer_mm, kBentShareOfSide * longer_mm));
 }
 
 Result<FreeLook> free_look(Observations& looks, const Board& board, const Calibration& calibration) {
@@ -202,7 +202,7 @@ Result<FreeLook> free_look(Observations& looks, const Board& board, const Calibr
     const auto fit = fit_drift(looks, free.rig, all, free.noise, weighing);
     if (!fit) return moved();
     const LookResiduals residuals = residuals_of_looks(looks, fit->rig);
-    free.noise.corner_px = std::max(sigma_of(residuals.corners), kSigmaMinPx);
+    free.noise.corner_px = std::max(sigma_of(residuals.corners), kLeastSigmaPx);
     free.noise.symbol_factor = std::max(sigma_of(residuals.symbols), 1e-3);
     if (mark_outlying(looks, fit->rig, free.noise) > kOutlyingMax) return moved();
     free.rig.rig_from_board = fit->rig.rig_from_board;

@@ -10,7 +10,7 @@
 namespace slsd {
 namespace {
 
-constexpr int kAcross = 8, kDown = 6;
+constexpr int kDirectionsAcross = 8, kDirectionsDown = 6;
 /// An explanation that is less likely by this factor does not count (logarithm).
 constexpr double kUnlikely = 12;
 
@@ -27,9 +27,9 @@ std::vector<SharedPoint> shared_points(double depth_mm, const Calibration& rig) 
   std::vector<SharedPoint> points;
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
     const CalibratedCamera& eye = rig.cameras[camera];
-    for (int i = 0; i < kAcross * kDown; ++i) {
-      const Eigen::Vector2d pixel((i % kAcross + 0.5) / kAcross * eye.lens.width_px - 0.5,
-                                  (i / kAcross + 0.5) / kDown * eye.lens.height_px - 0.5);
+    for (int i = 0; i < kDirectionsAcross * kDirectionsDown; ++i) {
+      const Eigen::Vector2d pixel((i % kDirectionsAcross + 0.5) / kDirectionsAcross * eye.lens.width_px - 0.5,
+                                  (i / kDirectionsAcross + 0.5) / kDirectionsDown * eye.lens.height_px - 0.5);
       const Eigen::Vector3d point = eye.projector_from_camera * (depth_mm * eye.lens.undistort(pixel).homogeneous());
       if (!(point.z() > 0)) continue;
       const Eigen::Vector2d lit = rig.projector.project(point);

@@ -15,7 +15,7 @@
 namespace slsd {
 namespace {
 
-constexpr int kRounds = 20;
+constexpr int kFitRounds = 20;
 constexpr double kSettled = 1e-6;    // squared step, in deviations
 constexpr double kFarOffSigmas = 4;  // at this distance a point counts a quarter
 constexpr Eigen::Index kBend = kSecondOrderTerms, kPlace = 6, kTogether = 2;
@@ -272,7 +272,7 @@ class DriftEquations {
 std::optional<DriftFit> fit_drift(const Observations& looks, const RigModel& rig, const Explanation& explanation,
                                   const LookNoise& noise, Weighing weighing) {
   DriftEquations equations(looks, rig, explanation, noise);
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFitRounds; ++round) {
     const auto moved = equations.step(weighing);
     if (!moved) return std::nullopt;
     if (*moved < kSettled) break;
