@@ -138,11 +138,11 @@ class Usage(unittest.TestCase):
     """What a program says that cannot do its work: one line says why, below how it is called."""
 
     RIGHT = {"conveyor.py": ["."], "drift.py": ["/tmp/none.csv", "1", "1"], "gap.py": ["-160,-110,240,230", "98,148,142,192"], "pick.py": ["80"],
-             "turn_table.py": ["/tmp/none.npy", "2", "-1,0,2010", "0,-1,0"], "to_open3d.py": ["/tmp/none.ply"], "live_view.py": []}
+             "turn_table.py": ["/tmp/none.npy", "2", "-1,0,2010", "0,-1,0"], "to_open3d.py": ["/tmp/none.ply"], "live_view.py": [], "print_part.py": ["/tmp/none.stl", "3"]}
     WRONG = {"conveyor.py": [[], ["/nonexistent"], [".", "/dev/gpiochip0"], [".", "/dev/gpiochip0", "x"]], "drift.py": [[], ["a.csv", "often"], ["a.csv", "1", "x"]],
              "gap.py": [[], ["1,2,3,4"], ["1,2,3", "1,2,3,4"], ["a", "b"], ["4,3,2,1", "1,2,3,4"], ["1,2,3,4", "1,2,3,4", "0"]],
              "pick.py": [["large"], ["0"], ["-5"], ["1", "2"]], "turn_table.py": [[], ["a.npy"], ["a.npy", "x"], ["a.npy", "0"], ["a.npy", "2", "1,2"], ["a.npy", "2", "1,2,3", "0,0,0"]],
-             "to_open3d.py": [[], ["a.ply", "b"]]}
+             "to_open3d.py": [[], ["a.ply", "b"]], "print_part.py": [[], ["a.stl"], ["a.stl", "1"], ["a.stl", "x"], ["a.stl", "3", "--box", "1"]]}
 
     def said(self, name, words):
         done = subprocess.run([sys.executable, PACKAGE / "examples" / name, *words], input="", text=True, capture_output=True, timeout=60, check=False,

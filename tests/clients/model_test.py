@@ -12,16 +12,19 @@ import tempfile
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent / "daemon"))
+PACKAGE = HERE.parents[1] / "clients/python"
+sys.path[:0] = [str(HERE.parent / "daemon"), str(PACKAGE)]
 
 import numpy as np  # noqa: E402
 
+import slsd  # noqa: E402
 from impostor import Impostor, result  # noqa: E402
 from mesh_test import mesh_ply  # noqa: E402
 
 PROGRAM = pathlib.Path(os.environ["SLSD_BIN"]) / "slsd-model"
 WIDTH, HEIGHT, FOCUS = 220, 200, 1000.0
 MIDDLE = np.array([0, 0, 600.0])
+PYTHON_ASKS = ("transport", "timeout_ms", "normals", "texture", "ambient", "picture", "why")
 STEP_DEGREES, SIGMA_MM, ALIKE_PX = 12, 0.05, 6
 
 
@@ -235,14 +238,15 @@ class Model(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("the recording was cut: its first 4 clouds are used", done.stderr)
 
-    def scanner(self, clouds, errors=()):
-        """A service whose scans give these clouds, the last one again and again. @param errors  by number of the scan"""
+    def scanner(self, clouds, errors=(), also=()):
+        """A service whose scans give these clouds, the last one again and again. @param errors  by number of the scan  @param also  parameters that a request may have"""
         asked = []
 
         def answer(request):
             if request["method"] == "settings":
                 return result(request, calibration=calibration())
-            self.assertEqual(request["params"], {"format": "ply", "density": "pixels", "coordinate_frame": "rig"})
+            asks = {key: value for key, value in request["params"].items() if key not in also}
+            self.assertEqual(asks, {"format": "ply", "density": "pixels", "coordinate_frame": "rig"})
             number = len(asked)
             asked.append(request)
             if number in dict(errors):
@@ -323,6 +327,55 @@ class Model(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("exists and is not an empty folder", done.stderr)
         self.assertFalse((self.folder / "none.ply").exists())
+
+    def test_python_gives_the_same_mesh_as_arrays(self):
+        with slsd.Model(calibration(), self.folder / "python", str(PROGRAM)) as model:
+            for each in self.clouds:
+                model.add(slsd.read_ply(each))
+            self.assertEqual(len(model), 30)
+            mesh = model.mesh()
+            np.testing.assert_array_equal(mesh.triangles, self.triangles)
+            np.testing.assert_array_equal(mesh.points, self.points)
+            self.assertEqual(mesh.xyz.shape, (len(self.points), 3))
+            self.assertEqual(mesh.report, self.report)
+            report = model.save(self.folder / "python.stl", close=True, voxel_mm=2, box=[-40, -100, 500, 100, 100, 700])
+            self.assertEqual(report["voxel_mm"], 2)
+            self.assertGreater(report["invented_share"], 0)
+        again = run("--from", self.folder / "python", "-o", self.folder / "python.ply", "--json")
+        self.assertEqual(json.loads(again.stdout), self.report)  # a folder that is kept is a recording
+
+    def test_python_says_what_is_wrong(self):
+        model = slsd.Model(calibration(), program=str(PROGRAM))
+        self.addCleanup(model.close)
+        with self.assertRaisesRegex(slsd.ScannerError, "has no clouds"):
+            model.mesh()
+        symbols = slsd.Cloud(np.zeros(3, [("x", "<f4"), ("sigma_mm", "<f4"), ("symbol", "u1")]), {}, {})
+        with self.assertRaisesRegex(ValueError, "clouds of pixels"):
+            model.add(symbols)
+        turned = slsd.read_ply(self.clouds[0])
+        turned.comments["coordinate_frame"] = "robot_base: the robot's"
+        with self.assertRaisesRegex(ValueError, "scanner's frame"):
+            model.add(turned)
+        model.add(slsd.read_ply(self.clouds[0]))
+        with self.assertRaisesRegex(slsd.ScannerError, "no place was measured by two clouds"):
+            model.mesh()
+        with self.assertRaises(FileExistsError):
+            slsd.Model(calibration(), self.turning)
+        missing = slsd.Model(calibration(), program="/nonexistent/slsd-model")
+        missing.add(slsd.read_ply(self.clouds[0]))
+        with self.assertRaisesRegex(slsd.NotFound, "install the package slsd-model"):
+            missing.mesh()
+        missing.close()
+
+    def test_the_example_prints_a_part(self):
+        scanner, asked = self.scanner(self.clouds, also=PYTHON_ASKS)
+        example = PACKAGE / "examples/print_part.py"
+        done = subprocess.run([sys.executable, example, self.folder / "part.stl", "30"], input="\n" * 30, capture_output=True, text=True, timeout=600,
+                              check=False, env={**os.environ, "SLSD_SOCKET": str(scanner.path), "PYTHONPATH": str(PACKAGE),
+                                                "PATH": f"{PROGRAM.parent}:{os.environ['PATH']}"})
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("30 views", done.stdout)
+        self.assertEqual(subprocess.run(("assimp", "info", self.folder / "part.stl"), capture_output=True, timeout=300, check=False).returncode, 0)
 
     def test_wrong_usage(self):
         cases = {("--from", "x"): "--output", ("--from", "x", "-o", "a.txt"): ".ply, .stl, .obj or .glb",

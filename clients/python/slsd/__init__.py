@@ -9,11 +9,13 @@
 from .cloud import Cloud, read_ply
 from .errors import (Busy, Cancelled, ConnectionLost, DeviceError, FrameError, InvalidRequest, NotFound,
                      PermissionDenied, ProtocolError, ScannerError, TimedOut)
+from .model import Mesh, Model
 from .options import CalibrationSettings, CameraSettings, CloudSettings, DecodeSettings, PatternSettings
 from .scanner import DEFAULT_SOCKET, Exposure, Frame, Scanner
 
 __all__ = [
     "Busy", "CalibrationSettings", "CameraSettings", "Cancelled", "Cloud", "CloudSettings", "ConnectionLost",
-    "DEFAULT_SOCKET", "DecodeSettings", "DeviceError", "Exposure", "Frame", "FrameError", "InvalidRequest", "NotFound", "PatternSettings",
+    "DEFAULT_SOCKET", "DecodeSettings", "DeviceError", "Exposure", "Frame", "FrameError", "InvalidRequest", "Mesh", "Model", "NotFound",
+    "PatternSettings",
     "PermissionDenied", "ProtocolError", "Scanner", "ScannerError", "TimedOut", "read_ply",
 ]
