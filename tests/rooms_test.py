@@ -36,6 +36,7 @@ BELOW = {
     "programs/calibrate": BASE | {"daemon/configuration", "daemon/scan", "daemon/rpc", "clients/cpp",
                                   "clients/connection", "programs/latency"},
     "programs/hand_eye": BASE | {"clients/usage", "daemon/configuration", "daemon/scan", "programs/calibrate"},
+    "programs/datasheet": BASE | PROTOCOL | {"clients/usage", "clients/cpp", "clients/connection"},
     "programs/verify": BASE | {"daemon/configuration", "daemon/scan", "programs/calibrate"},
     "programs/commands": BASE | PROTOCOL | {"daemon/configuration", "daemon/scan", "daemon/server", "daemon/bundle",
                                             "clients/connection", "programs/latency"},
