@@ -5,6 +5,8 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdint>
 #include <utility>
@@ -32,6 +34,10 @@ constexpr double kSymbolsHz = 15.0, kPixelsHz = 5.0;
 constexpr std::size_t kPastMax = 50;
 constexpr std::size_t kPastBytesMax = 48 << 20;
 constexpr std::size_t kScriptBytesMax = 4 << 20;
+
+// What a page may ask of a scan.
+constexpr std::array<std::string_view, 8> kScanKeys = {"density", "texture", "ambient", "normals",
+                                                       "preset",  "box",     "plane",   "box_frame"};
 
 // No exceptions: no external or inline script, style or picture, and no frame around the page.
 constexpr const char* kPolicy =
@@ -262,11 +268,12 @@ void PageServer::add_requests() {
   post("/api/login", true, [this](const Request& request, const json& body) { return log_in(request, body); });
 }
 
-tl::expected<Answered, Failure> PageServer::call(const char* method, json params, std::chrono::seconds timeout) const {
+tl::expected<Answered, Failure> PageServer::call(const char* method, const json& params,
+                                                 std::chrono::seconds timeout) const {
   auto connection = Connection::open(options_.socket);
   if (!connection) return tl::unexpected(failure(connection.error()));
   connection->set_timeout(timeout);
-  return ask(*connection, method, std::move(params));
+  return ask(*connection, method, params);
 }
 
 Answer PageServer::status() {
@@ -275,10 +282,11 @@ Answer PageServer::status() {
   const auto settings = call("settings", json::object(), kTimeoutOfStatus);
   if (!settings) return refusal(settings.error());
   const json& set = settings->reply.message["result"];
+  const json configuration = set.value("configuration", json::object());
   json result{{"status", status->reply.message["result"]},
               {"cameras", set.value("cameras", json::array())},
-              {"density",
-               set.value("configuration", json::object()).value("decode", json::object()).value("density", "symbols")}};
+              {"density", configuration.value("decode", json::object()).value("density", "symbols")},
+              {"part", configuration.value("cloud", json::object())}};
   json past = json::array();
   {
     const std::lock_guard lock(mutex_);
@@ -297,7 +305,7 @@ Answer PageServer::image(const Request& request, const char* method) const {
   if (parameter(request, "as_shown") == "1") params["as_shown"] = true;
   const bool raw = parameter(request, "format") == "raw" && method == std::string_view("frame");
   if (raw) params["format"] = "raw";
-  auto answered = call(method, std::move(params), kTimeout);
+  auto answered = call(method, params, kTimeout);
   if (!answered) return refusal(answered.error());
   const json about = answered->reply.message["result"];
   return {200,
@@ -311,7 +319,7 @@ Answer PageServer::image(const Request& request, const char* method) const {
 Answer PageServer::reasons(const Request& request) const {
   json params{{"why", true}};
   if (const std::string camera = parameter(request, "camera"); !camera.empty()) params["camera"] = camera;
-  const auto answered = call("preview", std::move(params), kTimeout);
+  const auto answered = call("preview", params, kTimeout);
   if (!answered) return refusal(answered.error());
   const json& about = answered->reply.message["result"];
   return json_answer({{"png", to_base64(answered->reply.bytes)}, {"reasons", about.value("reasons", json::array())}});
@@ -356,13 +364,13 @@ Answer PageServer::cloud(const Request& request) {
 Answer PageServer::scan(const json& body) {
   json params{{"format", "ply"}, {"coordinate_frame", "rig"}, {"timeout_ms", 60'000}, {"transport", "memfd"}};
   for (const auto& [key, value] : body.items()) {
-    const bool known = key == "density" || key == "texture" || key == "ambient" || key == "normals" || key == "preset";
-    if (!known) return refusal(400, "invalid_params", "no such parameter: \"" + printable(key, 64) + "\"");
+    if (std::ranges::find(kScanKeys, key) == kScanKeys.end())
+      return refusal(400, "invalid_params", "no such parameter: \"" + printable(key, 64) + "\"");
     params[key] = value;
   }
   // Organised, because a PLY of pixels does not contain their positions; the page makes both files from it.
   if (params.value("density", json()) == "pixels") params["format"] = "pcd";
-  auto answered = call("scan", std::move(params), kTimeout);
+  auto answered = call("scan", params, kTimeout);
   if (!answered) {
     keep({{{"time", utc_text_ms(std::chrono::system_clock::now())},
            {"error", printable(answered.error().error.message, 300)}},

@@ -71,7 +71,7 @@ class PageServer {
   void post(const char* path, bool open, HandleBody handle);
   void pass_on(const char* path, const char* method);
   [[nodiscard]] std::optional<Answer> refuse(const Request& request);
-  [[nodiscard]] tl::expected<Answered, Failure> call(const char* method, nlohmann::json params,
+  [[nodiscard]] tl::expected<Answered, Failure> call(const char* method, const nlohmann::json& params,
                                                      std::chrono::seconds timeout) const;
   [[nodiscard]] Answer index(const Page& page, const Request& request);
   [[nodiscard]] Answer log_in(const Request& request, const nlohmann::json& body);

@@ -30,6 +30,20 @@ timeout_ms = 60000
 [server]
 socket = "slsd.sock"
 """
+HAND_EYE = """%YAML:1.0
+---
+mounted: "cell"
+base_from_rig_R: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 1., 0., 0., 0., 1., 0., 0., 0., 1. ]
+base_from_rig_T: !!opencv-matrix
+   rows: 3
+   cols: 1
+   dt: d
+   data: [ 0., 0., 5000. ]
+"""
 CAN_SCAN = "!document.getElementById('scan').disabled"
 # The share of the view's middle that shows the background.
 GAPS = """
@@ -127,7 +141,7 @@ class Space(unittest.TestCase):
         for width, height, scheme in ((1600, 1300, "light"), (1280, 900, "dark"), (390, 844, "dark")):
             self.open(width, height, scheme)
             self.scan("pixels")
-            self.assertEqual(self.browser.run("return view.boxLines.geometry.getAttribute('position').count;"), 24)
+            self.assertEqual(self.browser.run("return view.boxLines[0].geometry.getAttribute('position').count;"), 24)
             self.turn(-0.35, -0.5)
             texts = self.browser.run("""
                 const texts = [], write = overlay.write;
@@ -199,6 +213,169 @@ class Space(unittest.TestCase):
         self.browser.click("#all-depths")
         self.assertEqual(self.browser.run(hidden), [0, False, True])
         self.assertEqual(self.browser.complaints(), [])
+
+    def drag(self, selector, begin, end):
+        """From one pixel of a canvas to another, with the mouse."""
+        places = self.browser.run("""
+            const [name, ...pixels] = arguments, canvas = document.querySelector(name);
+            canvas.scrollIntoView({block: "center"});
+            const place = canvas.getBoundingClientRect();
+            return pixels.map(([u, v]) => [Math.round(place.left + (u + 0.5) / canvas.width * place.width),
+                                           Math.round(place.top + (v + 0.5) / canvas.height * place.height)]);""", selector, begin, end)
+        moves = [{"type": "pointerMove", "duration": 0, "x": x, "y": y} for x, y in places]
+        self.browser.ask("POST", self.browser.session + "/actions", {"actions": [
+            {"type": "pointer", "id": "mouse", "actions": [moves[0], {"type": "pointerDown", "button": 0}, moves[1],
+                                                           {"type": "pointerUp", "button": 0}]}]})
+
+    def box(self):
+        return self.browser.run("return partOfScan().box ?? null;")
+
+    def test_a_box_is_drawn_on_the_map_and_measured_alone(self):
+        with self.service.client() as client:
+            self.open()
+            self.browser.click("#box summary")
+            self.browser.click("#box-draw")
+            self.browser.wait("/Scan first/.test(document.getElementById('message').textContent)", "no word that a scan is needed")
+            self.scan("pixels")
+            whole = points_of(client.call("scan", format="pcd", density="pixels", timeout_ms=60000)[1])
+            self.browser.click("#box-draw")
+            self.browser.wait("drawsBox && map.records", "no map to draw on")
+            self.drag("#map", (200, 120), (300, 220))  # the bust's face
+            low, high = np.reshape(self.box(), (2, 3))
+            self.assertEqual(self.browser.run("return [measurements.points().length, drawsBox, document.getElementById('rubber').hidden];"),
+                             [0, False, True])
+            place = np.stack([whole[axis] for axis in "xyz"], 1)
+            inside = np.all((place >= low) & (place <= high), axis=1)
+            self.assertTrue(4000 < inside.sum() < 20000, inside.sum())  # a hundred pixels aside
+            self.assertLess(high[2], 2200)  # the wall is not in it
+            self.browser.picture(self.folder / "box-map-1600.png")
+            self.scan("pixels")
+            self.assertAlmostEqual(self.browser.run("return view.ply.count;") / inside.sum(), 1, delta=0.02)
+            self.choose("shown-as", "space")
+            self.assertEqual(self.browser.run("return view.boxLines.length;"), 2)
+            across = "const p = view.camera.position; return p.distanceTo(view.controls.target);"
+            near = self.browser.run(across)
+            self.browser.picture(self.folder / "box-space-1600.png")
+            self.browser.click("#box-for-all")
+            self.browser.wait("boxChosen === null", "it is not set")
+            self.assertEqual(client.call("settings")[0]["set"]["cloud"], {"box": self.browser.run("return partOfService.box;")})
+            self.browser.click("#box-whole")
+            self.scan("pixels")
+            self.assertEqual(self.browser.run("return view.ply.count;"), len(whole))
+            self.assertLess(near, 0.5 * self.browser.run(across))  # the box filled the view
+            client.call("set", cloud={"box": None})
+            self.browser.wait("partOfService.box.length === 0", "the page does not follow")
+            self.browser.resize(390, 844)
+            self.browser.click("nav [data-view=cloud]")
+            self.assertLessEqual(self.browser.run("return document.documentElement.scrollWidth;"), 390)
+            self.browser.picture(self.folder / "box-390.png")
+            self.assertEqual(self.browser.complaints(), [])
+
+    def in_base(self, cloud):
+        """A scanner in the robot's cell, whose base is 5 m behind the rig."""
+        service = Service(configuration=CONFIGURATION + f'[frame]\nhand_eye = "hand_eye.yml"\n[cloud]\n{cloud}\nbox_frame = "robot_base"\n')
+        (service.folder / "hand_eye.yml").write_text(HAND_EYE, encoding="utf-8")
+        self.enterContext(service)
+        self.web = self.enterContext(Web(service))
+        service.wait_ready()
+        self.open()
+        self.browser.click("#box summary")
+        return service
+
+    def note(self):
+        return self.browser.run("return document.getElementById('box-note').textContent;")
+
+    def set_box(self, box):
+        for name, value in zip(("x-from", "y-from", "z-from", "x-to", "y-to", "z-to"), box):
+            self.choose(name, value)
+
+    def test_a_plane_in_the_robots_base_keeps_its_frame(self):
+        with self.service.client() as client:
+            whole = points_of(client.call("scan", format="pcd", density="pixels", timeout_ms=60000)[1])
+        middle = float(np.median(whole["z"]))
+        service = self.in_base(f"plane = [0, 0, 1, {5000 + middle}]")  # in the rig's frame it would leave nothing
+        self.browser.wait("planeIsInBase()", "no word of the plane")
+        self.scan("pixels")
+        beyond = np.count_nonzero(whole["z"] > middle)
+        self.assertAlmostEqual(self.browser.run("return view.ply.count;") / beyond, 1, delta=0.02)
+        self.set_box((-1000, -1000, middle - 300, 1000, 1000, middle + 300))
+        self.assertRegex(self.note(), "cannot be kept for every scan: .* a plane is configured in the robot's base")
+        self.assertTrue(self.browser.run("return document.getElementById('box-for-all').disabled;"))
+        self.assertEqual(self.browser.run("return [partOfScan().box_frame, partOfScan().plane];"), ["rig", []])
+        self.scan("pixels")
+        inside = np.count_nonzero((abs(whole["x"]) <= 1000) & (abs(whole["y"]) <= 1000) & (abs(whole["z"] - middle) <= 300))
+        self.assertAlmostEqual(self.browser.run("return view.ply.count;") / inside, 1, delta=0.02)
+        self.browser.picture(self.folder / "box-plane-in-base.png")
+        self.browser.click("#box-whole")
+        self.scan("pixels")
+        self.assertAlmostEqual(self.browser.run("return view.ply.count;") / beyond, 1, delta=0.02)
+        self.browser.click("#box-for-all")
+        self.browser.wait("boxChosen === null", "it is not set")
+        with service.client() as client:
+            self.assertEqual(client.call("settings")[0]["set"]["cloud"], {"box": []})
+        self.assertEqual(self.browser.complaints(), [])
+
+    def test_a_box_in_the_robots_base_is_not_drawn_and_gives_way(self):
+        service = self.in_base("box = [-1000, -1000, 5100, 1000, 1000, 7100]")
+        self.browser.wait("boxIsInBase()", "no word of the box")
+        self.assertIn("a box in the robot's base. The page cannot draw it.", self.note())
+        self.scan("pixels")
+        self.assertEqual(self.browser.run("return [view.boxLines.length, document.getElementById('x-from').value];"), [1, ""])
+        self.set_box((-1000, -1000, 100, 1000, 1000, 2100))
+        self.assertEqual(self.browser.run("return view.boxLines.length;"), 2)
+        count = self.browser.run("return view.ply.count;")
+        self.scan("pixels")
+        self.assertEqual(self.browser.run("return view.ply.count;"), count)  # the same box
+        self.browser.click("#box-for-all")
+        self.browser.wait("boxChosen === null", "it is not set")
+        with service.client() as client:
+            self.assertEqual(client.call("settings")[0]["set"]["cloud"], {"box": [-1000, -1000, 100, 1000, 1000, 2100], "box_frame": "rig"})
+            self.assertEqual(client.call("scan", density="pixels", timeout_ms=60000)[0]["points"], count)
+        self.assertEqual(self.note(), "Every scan measures this box alone.")
+        self.assertEqual(self.browser.complaints(), [])
+
+    def test_a_box_and_a_chosen_preset_do_not_mix(self):
+        state = self.enterContext(tempfile.TemporaryDirectory(prefix="slsd-test-"))
+        service = self.enterContext(Service(configuration=CONFIGURATION, environment={"STATE_DIRECTORY": state}))
+        self.web = self.enterContext(Web(service))
+        service.wait_ready()
+        with service.client() as client:
+            client.call("preset", action="save", name="part")
+            client.call("set", decode={"density": "pixels"})  # other settings than the preset's
+        self.open()
+        self.scan("symbols")
+        self.browser.wait("presets.part && presetInForce === null", "no preset")
+        self.choose("preset", "part")
+        self.browser.click("#box summary")
+        self.set_box((-100, -100, 100, 100, 100, 2100))
+        self.browser.wait("/Scan with the chosen preset first/.test(document.getElementById('message').textContent)", "no message")
+        self.assertEqual(self.browser.run("return partOfScan();"), {})
+        self.scan("symbols")
+        self.assertTrue(self.browser.run("return document.getElementById('message').hidden;"))
+        self.set_box((-100, -100, 100, 100, 100, 2100))
+        self.assertEqual(self.box(), [-100, -100, 100, 100, 100, 2100])
+
+    def test_a_box_that_is_wrong_has_its_message_and_changes_nothing(self):
+        self.open()
+        self.scan("pixels")
+        self.choose("shown-as", "z")
+        self.browser.wait("map.records", "no map")
+        before = self.browser.run("return shownScan.scan;")
+        self.browser.click("#box summary")
+        self.browser.click("#box-draw")
+        self.drag("#map", (2, 2), (3, 3))
+        self.browser.wait("/too few points/.test(document.getElementById('message').textContent)", "no message")
+        for name, value in zip(("x-from", "x-to", "y-from", "y-to", "z-from", "z-to"), (10, -10, 0, 10, 2000, 2100)):
+            self.choose(name, value)
+        self.browser.wait("/end of x must be greater/.test(document.getElementById('message').textContent)", "no message")
+        self.assertIsNone(self.box())
+        for name, value in (("x-to", 90010), ("x-from", 90000)):  # far aside
+            self.choose(name, value)
+        self.assertEqual(self.box(), [90000, 0, 2000, 90010, 10, 2100])
+        self.browser.click("#scan")
+        self.browser.wait("!document.getElementById('message').hidden && !document.getElementById('scan').disabled", "no message")
+        self.assertIn("box", self.browser.run("return document.getElementById('message').textContent;"))
+        self.assertEqual(self.browser.run("return shownScan.scan;"), before)
 
     def test_a_scan_says_how_far_it_is(self):
         self.open()

@@ -16,7 +16,7 @@ function showCloud(buffer, about) {
   offerDepths(ply);
   view.show(ply);
   overlay.box = boxOf(ply);
-  view.drawBox(overlay.box);
+  showBox();
   offerColours();
   measurements.clear();  // which draws
   $("under-cursor").textContent = "";
@@ -120,7 +120,8 @@ function followCursor(event) {
 async function scan() {
   const preset = presetOfScan();
   const density = $("density").value;
-  const {buffer, about} = await askWithProgress("api/scan", {density, ...preset}, density);
+  const {buffer, about} = await askWithProgress("api/scan", {density, ...preset, ...partOfScan()}, density);
+  boxWasScanned();
   showCloud(buffer, about);
   if (preset.preset) await presetWasScanned();
 }
@@ -176,6 +177,7 @@ function beginCloud() {
   });
   measurements = new Measurements($("distances"), $("distance"), () => view && view.ply && drawShown());
   map = new MapView($("map"));
+  beginBox();  // before: what draws a box measures nothing
   for (const place of [$("space"), $("map")]) beginPointing(place);
   $("scan").disabled = $("cloud-live").disabled = true;  // until there is something to draw clouds with
 }

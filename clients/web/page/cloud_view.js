@@ -309,20 +309,20 @@ class CloudView {
     return index < 0 ? -1 : recordOf(index, this.ply.count);
   }
 
-  // The edges of a box in the rig's frame, or none.
-  drawBox(box) {
-    if (this.boxLines) {
-      this.scene.remove(this.boxLines);
-      this.boxLines.geometry.dispose();
-      this.boxLines.material.dispose();
-      this.boxLines = null;
+  // The edges of boxes in the rig's frame: around the cloud, and of what scans measure; null: none.
+  drawBox(around, measured) {
+    for (const line of this.boxLines || []) {
+      this.scene.remove(line);
+      line.geometry.dispose();
+      line.material.dispose();
     }
-    if (!box) return;
-    const corners = edgesOf(box).flatMap(({ends}) => ends.map(([x, y, z]) => new THREE.Vector3(x, -y, -z)));
-    this.boxLines = new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(corners),
-                                           new THREE.LineBasicMaterial({color: 0x5f6670}));
-    this.boxLines.frustumCulled = false;
-    this.scene.add(this.boxLines);
+    this.boxLines = [[around, 0x5f6670], [measured, 0xff9d3b]].filter(([box]) => box).map(([box, color]) => {
+      const corners = edgesOf(box).flatMap(({ends}) => ends.map(([x, y, z]) => new THREE.Vector3(x, -y, -z)));
+      const line = new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(corners), new THREE.LineBasicMaterial({color}));
+      line.frustumCulled = false;
+      this.scene.add(line);
+      return line;
+    });
   }
 
   clearMarks() {

@@ -162,6 +162,7 @@ function showStatus(told) {
   allow($("calibrate-begin"), mayAdminister);
   showPresets();
   allow($("expose"), mayAdminister);
+  allow($("box-for-all"), mayKeepBox());
   if (!mayAdminister) $("calibrate-next").textContent =
     "slsd-web may not administer this scanner; docs/page.md says how to allow it.";
   const [kind, words] = stateInWords(told);
@@ -179,6 +180,7 @@ function showStatus(told) {
   cameraSizes = status.cameras.map(({width_px: width, height_px: height}) => ({width, height}));
   showCameras(status.cameras.map((camera) => camera.name));
   showSettings(told.cameras);
+  followPart(told.part);
   showPast(told.past);
 }
 

@@ -39,6 +39,7 @@ async function readPresets() {
 
 function choosePreset() {
   presetChosen = $("preset").value || null;
+  forgetBox();  // a preset has its own
   const {density} = (presetChosen && presets[presetChosen].settings.decode) || {};
   if (density) {  // else the page would ask for another one
     $("density").value = density;
