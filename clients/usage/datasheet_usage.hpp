@@ -32,7 +32,6 @@ inline constexpr const char* kDatasheetProgram = "slsd-datasheet";
 inline constexpr const char* kDatasheetPurpose = "measure how exact the scanner is, with a plate and spheres, as a PDF";
 inline constexpr const char* kDatasheetExamples =
     "  slsctl datasheet acceptance --plate 6\n"
-    "  slsctl datasheet acceptance --sphere 10 --bar 7 --diameter-mm 40.012 --spacing-mm 200.034\n"
-    "  slsctl datasheet --ball-bar bar.stl --diameter-mm 40 --spacing-mm 200\n";
+    "  slsctl datasheet acceptance --sphere 10 --bar 7 --diameter-mm 40.012 --spacing-mm 200.034\n";
 
 }  // namespace slsd

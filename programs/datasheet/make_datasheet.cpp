@@ -107,7 +107,9 @@ Result<> take_place(PlaceScanner& scanner, Artefact artefact, int number, int pl
       std::cerr << added.error().message << "\n";
       continue;
     }
-    if (auto written = write_file_atomically(request.folder / name, *bytes); !written) return written;
+    Result<> written = make_folder(request.folder);
+    if (written) written = write_file_atomically(request.folder / name, *bytes);
+    if (!written) return written;
     std::cerr << figures.lines.back() << "\n";
     return {};
   }
@@ -219,7 +221,6 @@ Result<> write_ball_bar(const DatasheetRequest& request) {
 
 Result<> make_datasheet(const DatasheetRequest& request) {
   if (!request.ball_bar.empty()) return write_ball_bar(request);
-  if (auto made = make_folder(request.folder); !made) return made;
   Figures figures;
   std::optional<PlaceScanner> scanner;
   for (const auto& [artefact, places] :

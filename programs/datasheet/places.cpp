@@ -41,8 +41,9 @@ std::string cloud_name(Artefact artefact, int number) {
 
 Result<std::map<int, path>> clouds_in(const path& folder, Artefact artefact) {
   std::error_code error;
-  std::filesystem::directory_iterator entries(folder, error);
   std::map<int, path> clouds;
+  if (!std::filesystem::exists(folder, error)) return clouds;
+  std::filesystem::directory_iterator entries(folder, error);
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
     if (const auto number = number_of(entries->path().filename().string(), to_string(artefact) + "-"))
       clouds[*number] = entries->path();

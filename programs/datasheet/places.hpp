@@ -21,7 +21,7 @@ enum class Artefact { kPlate, kSphere, kBar };
 /// "plate-03.ply". @param number  from 1
 [[nodiscard]] std::string cloud_name(Artefact artefact, int number);
 
-/// The artefact's clouds in a folder, by number.
+/// The artefact's clouds in a folder, by number; none if there is no folder.
 /// @errors kIo: the folder cannot be read
 [[nodiscard]] Result<std::map<int, std::filesystem::path>> clouds_in(const std::filesystem::path& folder,
                                                                      Artefact artefact);
