@@ -360,12 +360,9 @@ class Model(unittest.TestCase):
         with self.assertRaisesRegex(slsd.ScannerError, "no place was measured by two clouds"):
             model.mesh()
         with self.assertRaises(FileExistsError):
-            slsd.Model(calibration(), self.turning)
-        missing = slsd.Model(calibration(), program="/nonexistent/slsd-model")
-        missing.add(slsd.read_ply(self.clouds[0]))
+            slsd.Model(calibration(), self.turning, str(PROGRAM))
         with self.assertRaisesRegex(slsd.NotFound, "install the package slsd-model"):
-            missing.mesh()
-        missing.close()
+            slsd.Model(calibration(), program="/nonexistent/slsd-model")
 
     def test_the_example_prints_a_part(self):
         scanner, asked = self.scanner(self.clouds, also=PYTHON_ASKS)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
 from typing import TYPE_CHECKING, Any, Mapping, Sequence
@@ -59,12 +60,16 @@ class Model:
     calibration  the scanner that measures the clouds, or the text of its calibration
     folder       keeps the clouds in this new folder, as a recording for slsd-model --from; None: in a temporary one
     program      the file of slsd-model
+
+    Raises NotFound if the scanner is not calibrated, or slsd-model is not installed.
     """
 
     def __init__(self, calibration: Scanner | str, folder: str | os.PathLike[str] | None = None, program: str = "slsd-model"):
         text = calibration if isinstance(calibration, str) else str(calibration.settings().get("calibration") or "")
         if not text:
             raise NotFound("the scanner is not calibrated: run slsd --calibrate", "not_calibrated")
+        if shutil.which(program) is None:
+            raise NotFound(f"{program} is not installed: install the package slsd-model", "not_found")
         self._temporary = tempfile.TemporaryDirectory(prefix="slsd-model-") if folder is None else None
         self._folder = pathlib.Path(self._temporary.name if self._temporary else str(folder))
         if self._temporary is None:
@@ -110,7 +115,7 @@ class Model:
         voxel_mm  the mesh's resolution; None: by the clouds' pixels and sigmas
         box       uses points in this box alone: x, y and z of its least corner, then of the other, mm
 
-        Raises ScannerError if the clouds give no mesh; its text says why. NotFound: slsd-model is not installed.
+        Raises ScannerError if the clouds give no mesh; its text says why.
         """
         words = [self._program, "--from", str(self._folder), "-o", os.fspath(file), "--json"]
         if close:
@@ -121,10 +126,7 @@ class Model:
             words += ["--box", *(repr(float(number)) for number in box)]
         if not self._count:
             raise ScannerError("the model has no clouds: add them first")
-        try:
-            done = subprocess.run(words, capture_output=True, text=True, check=False)
-        except FileNotFoundError as error:
-            raise NotFound(f"{self._program} is not installed: install the package slsd-model", "not_found") from error
+        done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise ScannerError(done.stderr.strip().rsplit("\n", 1)[-1] or f"{self._program} ended with {done.returncode}")
         report: dict[str, Any] = json.loads(done.stdout)
