@@ -255,7 +255,7 @@ Result<> check_size_of_drift(const DriftFit& fit, double baseline_mm) {
   return {};
 }
 
-/// Whether points move so little that a correction is not worth it.
+/// Tells whether points move so little that a correction is not worth it.
 bool hardly_moves(const std::vector<DeviationAt>& deviations, const CalibrationReport& report) {
   return std::ranges::all_of(deviations, [&](const DeviationAt& at) {
     return at.before_mm < std::max(kHardlyShare * at.depth_mm, 2 * report.depth_sigma_mm(at.depth_mm).value_or(0));
