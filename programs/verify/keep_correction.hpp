@@ -17,8 +17,7 @@ namespace slsd {
 
 /// Puts the calibration of before its corrections in force again.
 /// @errors kNotFound: the calibration in force was not corrected; kMismatch: the one beside it is of another date;
-/// those
-///         of the configuration and the files
+///         those of the configuration and the files
 [[nodiscard]] Result<> undo_correction(const std::optional<std::filesystem::path>& configuration_file);
 
 }  // namespace slsd
