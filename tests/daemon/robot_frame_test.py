@@ -188,6 +188,7 @@ class RobotFrame(unittest.TestCase):
                 if mounted == "arm":
                     self.refused(client, 'add the robot\'s pose .* "box_frame": "rig"', coordinate_frame="rig", box=box, box_frame="robot_base")
                 client.call("set", cloud={"box": box, "box_frame": "robot_base"})
+                self.assertEqual(client.call("preview", timeout_ms=60000)[0]["points"], len(at))
                 if mounted == "arm":
                     self.refused(client, "no poses come with a stream: .* box and plane are in the robot's base", "subscribe", coordinate_frame="rig")
                 self.assertEqual(client.call("scan", timeout_ms=60000, **pose)[0]["points"], numpy.count_nonzero(inside))

@@ -333,6 +333,7 @@ void run_preview(ServiceState& state, const json& params, Session& session, Resp
   if (auto error = reader.error()) return respond(tl::unexpected(*error));
   ScanRequest request{deadline_in(timeout_ms), true, camera};
   request.why = why;
+  request.part = CloudOptions();  // a picture shows all symbols, and needs no place in the robot's base
   request.gone = session.gone();
   if (auto refused = session.reserve(expected_bytes(state, request))) return respond(tl::unexpected(*refused));
   state.scanner.scan(request, carry_scan(state, std::move(respond), [why](const ScanResult& scan) -> Outcome {
