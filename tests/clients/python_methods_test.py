@@ -21,6 +21,7 @@ sys.path[:0] = [str(PACKAGE), str(HERE.parent / "daemon"), str(HERE)]
 
 import numpy as np  # noqa: E402
 
+import patience  # noqa: E402, F401
 import slsd  # noqa: E402
 from impostor import Impostor, ply, result  # noqa: E402
 from service import Service  # noqa: E402

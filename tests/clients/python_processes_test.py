@@ -23,12 +23,13 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 
 import numpy as np  # noqa: E402
 
+import patience  # noqa: E402, F401
 import slsd  # noqa: E402
 from impostor import Impostor, ply, result  # noqa: E402
 from service import Service, wait_until  # noqa: E402
 from slsd.connection import Connection  # noqa: E402
 
-CHILD_S = 60
+CHILD_S = 600  # ends what hangs, also on a busy machine
 
 
 class Child:

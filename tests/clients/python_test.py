@@ -21,6 +21,7 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 
 import numpy as np  # noqa: E402
 
+import patience  # noqa: E402, F401
 import slsd  # noqa: E402
 from impostor import Impostor, ply, result  # noqa: E402
 from point_cloud import vertices  # noqa: E402

@@ -2,7 +2,7 @@
 # Copyright the slsd authors
 """A node of ROS 2 by its own client library, with the middleware and sockets that are its defaults.
 
-usage: ros_node.py NAME CAMERA [--calls N] [--topics TOPIC...] [--seconds S] [--measure S] [--reliable]
+usage: ros_node.py NAME CAMERA [--calls N] [--topics TOPIC...] [--find S] [--seconds S] [--measure S] [--reliable]
 
 Reads topics of scanner NAME, calls its trigger, and prints what it saw as JSON.
 """
@@ -24,7 +24,8 @@ def arguments():
     parser.add_argument("camera")
     parser.add_argument("--calls", type=int, default=0, help="of the trigger")
     parser.add_argument("--topics", nargs="*", default=[], help="to read, beside diagnostics")
-    parser.add_argument("--seconds", type=float, default=40, help="to wait for three samples of each topic")
+    parser.add_argument("--find", type=float, default=300, help="seconds to wait for the scanner")
+    parser.add_argument("--seconds", type=float, default=300, help="to wait for three samples of each topic")
     parser.add_argument("--measure", type=float, default=0, help="seconds of reading, instead")
     parser.add_argument("--reliable", action="store_true", help="do not ask for sensors' QoS")
     return parser.parse_args()
@@ -62,9 +63,14 @@ def call(node, client, calls):
     answers = []
     for _ in range(calls):
         future = client.call_async(Trigger.Request())
-        rclpy.spin_until_future_complete(node, future, timeout_sec=15)
+        rclpy.spin_until_future_complete(node, future, timeout_sec=120)
         answers.append([future.result().success, future.result().message] if future.done() else None)
     return answers
+
+
+def wait_for_node(node, wanted, end):
+    while wanted not in node.get_node_names_and_namespaces() and time.monotonic() < end:
+        rclpy.spin_once(node, timeout_sec=0.1)
 
 
 def described(newest):
@@ -90,7 +96,7 @@ def main():
     quality = QoSProfile(depth=5, reliability=ReliabilityPolicy.RELIABLE) if given.reliable else qos_profile_sensor_data
     reader = Reader(node, topics, {*given.topics, "diagnostics"}, quality)
     client = node.create_client(Trigger, f"/{given.name}/trigger")
-    found = client.wait_for_service(timeout_sec=20)
+    found = client.wait_for_service(timeout_sec=given.find)
     begin = time.monotonic()
     answers = call(node, client, given.calls if found else 0)
     took = time.monotonic() - begin
@@ -98,6 +104,8 @@ def main():
     end = time.monotonic() + (given.measure or given.seconds)
     while time.monotonic() < end and (given.measure or any(len(reader.numbers[key]) - before[key] < 3 for key in given.topics)):
         rclpy.spin_once(node, timeout_sec=0.1)
+    if found:  # the graph of nodes may come after the topics
+        wait_for_node(node, ("slsd", f"/{given.name}"), end)
     endpoints = [[topic, info.node_namespace, info.node_name, str(info.topic_type_hash)]
                  for _, topic in topics.values() for info in node.get_publishers_info_by_topic(topic)]
     json.dump({

@@ -19,6 +19,7 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 
 import numpy as np  # noqa: E402
 
+import patience  # noqa: E402, F401
 import slsd  # noqa: E402
 from dds_test import DOMAIN, FIELDS, RECORD, Bridge  # noqa: E402
 from service import BIN, Service  # noqa: E402
@@ -32,7 +33,7 @@ CLOUD_HASH = "RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124b
 def has_ros():
     try:
         return subprocess.run([PYTHON, "-c", "import rclpy, sensor_msgs.msg, std_srvs.srv, diagnostic_msgs.msg"],
-                              capture_output=True, timeout=60, check=False).returncode == 0
+                              capture_output=True, timeout=600, check=False).returncode == 0
     except OSError:
         return False
 
@@ -40,7 +41,7 @@ def has_ros():
 def node(*arguments, **environment):
     """What a node of ROS says of scanner "left"."""
     mine = {key: value for key, value in os.environ.items() if not key.startswith(("ROS_", "RMW_", "PYTHONPATH"))}
-    done = subprocess.run([PYTHON, HERE / "ros_node.py", "left", "camera", *arguments], capture_output=True, text=True, timeout=200,
+    done = subprocess.run([PYTHON, HERE / "ros_node.py", "left", "camera", *arguments], capture_output=True, text=True, timeout=600,
                           env={**mine, "ROS_DOMAIN_ID": str(DOMAIN), **(environment or LOCALHOST)}, check=False)
     if done.returncode != 0:
         raise RuntimeError(done.stderr)
@@ -107,7 +108,7 @@ class Ros(unittest.TestCase):
             others = [subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) for _ in range(3)]
             seen = node("--calls", str(CALLS))
             for other in others:
-                out, _ = other.communicate(timeout=60)
+                out, _ = other.communicate(timeout=600)
                 self.assertRegex(out, r"^1122334455667788 42 1 \d+ points, scan ")
         self.assertEqual([answer and answer[0] for answer in seen["answers"]], [True] * CALLS)
 
@@ -122,7 +123,7 @@ class Ros(unittest.TestCase):
 
     def test_finds_none_that_is_off(self):
         with shown(self.service, "--rate", "5", ROS_AUTOMATIC_DISCOVERY_RANGE="OFF"):
-            seen = node()
+            seen = node("--find", "20")
         self.assertEqual((seen["found"], seen["nodes"]), (False, [["reader", "/"]]))
 
 

@@ -19,6 +19,7 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 
 import numpy as np  # noqa: E402
 
+import patience  # noqa: E402, F401
 import slsd  # noqa: E402
 from service import Service, slsd as run_slsd  # noqa: E402
 
