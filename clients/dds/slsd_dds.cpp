@@ -6,11 +6,14 @@
 #include <optional>
 #include <string>
 
+#include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
 #include "bridge.hpp"
 #include "clients/usage/usage.hpp"
+#include "core/geometry/robot_pose.hpp"
 #include "merge.hpp"
+#include "tf/robot_poses.hpp"
 
 namespace {
 
@@ -25,10 +28,63 @@ int describe(const slsd::dds::BridgeOptions& options, const std::string& calibra
   return std::fputs(text->c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
 }
 
+slsd::Result<slsd::dds::Network> join(slsd::dds::NetworkOptions network, std::string doubt) {
+  network.discovery = slsd::dds::read_discovery([](const char* variable) {
+    const char* value = std::getenv(variable);
+    return std::string(value ? value : "");
+  });
+  if (!doubt.empty()) network.discovery.warnings.push_back(std::move(doubt));
+  for (const std::string& warning : network.discovery.warnings) std::fprintf(stderr, "slsd-dds: %s\n", warning.c_str());
+  return slsd::dds::Network::open(network);
+}
+
+int print_pose(const slsd::dds::NetworkOptions& options, const slsd::dds::RobotFrames& frames) {
+  const auto network = join(options, {});
+  if (!network) return failed(network.error());
+  const auto poses = slsd::dds::RobotPoses::open(*network, frames);
+  if (!poses) return failed(poses.error());
+  const auto pose = (*poses)->standing();
+  if (!pose) return failed(pose.error());
+  const auto numbers = robot_numbers(*pose, *slsd::pose_notation("ros"));
+  std::printf("%s\n", fmt::format("{:.8f}", fmt::join(numbers, ",")).c_str());
+  return std::fflush(stdout) != 0 ? 1 : 0;
+}
+
+void add_scanner_options(CLI::App& app, slsd::dds::BridgeOptions& options) {
+  app.add_option("--socket", options.socket,
+                 "the service's socket (SLSD_SOCKET in the environment, or /run/slsd/slsd.sock)");
+  app.add_option("--rate", options.rate_hz, "at most this many clouds per second; 0: only triggered ones")
+      ->check(slsd::between(0.0, 1000.0));
+  app.add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
+      ->check(slsd::one_of({"symbols", "pixels"}));
+  app.add_option("--stride", options.thinning.stride,
+                 "use every Nth camera pixel and row in dense clouds and depth images (2)")
+      ->check(slsd::between(1, 16));
+  app.add_option("--voxel", options.thinning.voxel_mm, "keep one point per cube of this size in mm; 0: keep all (0)")
+      ->check(slsd::between(0.0, 1000.0));
+  app.add_option("--image-rate", options.image_rate_hz, "images per second, 1 or more; 0: none (0)")
+      ->check(slsd::between(0.0, 100.0));
+  app.add_option("--extrinsics", options.extrinsics, "the TOML file with the poses of the scanners");
+  app.add_flag_callback(
+      "--no-transforms", [&options] { options.transforms = false; },
+      "do not publish /tf_static; a robot description has the frames");
+}
+
+void add_robot_options(CLI::App& app, slsd::dds::RobotFrames& robot, bool& prints_pose) {
+  app.add_option("--robot-base", robot.base, "the frame of clouds in the robot's base (base_link)")->type_name("FRAME");
+  auto* flange = app.add_option("--flange", robot.flange, "the frame of the robot's flange in tf, such as tool0")
+                     ->type_name("FRAME");
+  auto* prints =
+      app.add_flag("--print-pose", prints_pose,
+                   "print the pose of --flange in --robot-base for slsctl --poses ros, once it stands still, and exit")
+          ->needs(flange);
+  flange->needs(prints);
+}
+
 void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& merge) {
   auto* merging = app.add_flag("--merge", merges, "publish one cloud of several scanners, placed by --extrinsics");
-  for (const char* alone :
-       {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate", "--no-transforms", "--describe"})
+  for (const char* alone : {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate", "--no-transforms",
+                            "--describe", "--print-pose"})
     merging->excludes(app.get_option(alone));
   app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; may be repeated (all in the file)")
       ->needs(merging);
@@ -62,24 +118,10 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "slsd-dds " SLSD_VERSION);
   auto* name = app.add_option("--name", options.name,
                               "the scanner's name, with which its topics begin (scanner; with --merge: merged)");
-  app.add_option("--socket", options.socket,
-                 "the service's socket (SLSD_SOCKET in the environment, or /run/slsd/slsd.sock)");
-  app.add_option("--rate", options.rate_hz, "at most this many clouds per second; 0: only triggered ones")
-      ->check(slsd::between(0.0, 1000.0));
-  app.add_option("--density", options.density, "a point for each symbol, or for each camera pixel")
-      ->check(slsd::one_of({"symbols", "pixels"}));
-  app.add_option("--stride", options.thinning.stride,
-                 "use every Nth camera pixel and row in dense clouds and depth images (2)")
-      ->check(slsd::between(1, 16));
-  app.add_option("--voxel", options.thinning.voxel_mm, "keep one point per cube of this size in mm; 0: keep all (0)")
-      ->check(slsd::between(0.0, 1000.0));
-  app.add_option("--image-rate", options.image_rate_hz, "images per second, 1 or more; 0: none (0)")
-      ->check(slsd::between(0.0, 100.0));
-  app.add_option("--robot-base", options.robot_base, "the frame of clouds in the robot's base")->type_name("FRAME");
-  app.add_option("--extrinsics", options.extrinsics, "the TOML file with the poses of the scanners");
-  app.add_flag_callback(
-      "--no-transforms", [&options] { options.transforms = false; },
-      "do not publish /tf_static; a robot description has the frames");
+  add_scanner_options(app, options);
+  bool prints_pose = false;
+  slsd::dds::RobotFrames robot;
+  add_robot_options(app, robot, prints_pose);
   std::optional<std::string> calibration;
   app.add_option("--describe", calibration,
                  "print the scanner as a robot description (URDF), from this calibration file or the one in force")
@@ -91,21 +133,16 @@ int main(int argc, char** argv) {
   add_network_options(app, network);
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   if (calibration) return describe(options, *calibration);
+  if (prints_pose) return print_pose(network, robot);
   // Blocked before the first thread starts: all threads leave these signals to the one that waits for them.
   sigset_t ends;
   sigemptyset(&ends);
   sigaddset(&ends, SIGINT);
   sigaddset(&ends, SIGTERM);
   pthread_sigmask(SIG_BLOCK, &ends, nullptr);
-  network.discovery = slsd::dds::read_discovery([](const char* variable) {
-    const char* value = std::getenv(variable);
-    return std::string(value ? value : "");
-  });
-  if (std::string warning = slsd::dds::receive_buffer_warning(); !warning.empty())
-    network.discovery.warnings.push_back(std::move(warning));
-  for (const std::string& warning : network.discovery.warnings) std::fprintf(stderr, "slsd-dds: %s\n", warning.c_str());
-  auto joined = slsd::dds::Network::open(network);
+  auto joined = join(network, slsd::dds::receive_buffer_warning());
   if (!joined) return failed(joined.error());
+  options.robot_base = robot.base;
   slsd::Result<std::unique_ptr<slsd::dds::Bridge>> bridge;
   slsd::Result<std::unique_ptr<slsd::dds::Merge>> merged;
   if (merges) {

@@ -9,7 +9,10 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <iostream>
+#include <iterator>
 #include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -159,6 +162,35 @@ int write_clouds(const Network& network, const std::string& topic, ForeignCloud 
   return 0;
 }
 
+// Lines of standard input, each with `tf` or `tf_static`, parent, child, the stamp (seconds, nanoseconds), place and
+// quaternion; an empty line sends the transforms before it as one message.
+int write_transforms(const Network& network) {
+  const auto& type = tf2_msgs_msg_dds__TFMessage__desc;
+  const std::map<std::string, dds_entity_t> writers{
+      {"tf", network.writer(type, "rt/tf", Quality::kService)},
+      {"tf_static", network.writer(type, "rt/tf_static", Quality::kLatched)}};
+  std::vector<std::vector<std::string>> waiting;
+  for (std::string line; std::getline(std::cin, line);) {
+    std::istringstream words(line);
+    const std::vector<std::string> told(std::istream_iterator<std::string>(words), {});
+    if (!told.empty()) waiting.push_back(told);
+    if (!told.empty() || waiting.empty()) continue;
+    std::vector<geometry_msgs_msg_dds__TransformStamped_> transforms;
+    for (auto& each : waiting) {
+      const auto number = [&](std::size_t i) { return std::strtod(each.at(i).c_str(), nullptr); };
+      transforms.push_back(
+          {{{static_cast<std::int32_t>(number(3)), static_cast<std::uint32_t>(number(4))}, each[1].data()},
+           each[2].data(),
+           {{number(5), number(6), number(7)}, {number(8), number(9), number(10), number(11)}}});
+    }
+    const auto count = static_cast<std::uint32_t>(transforms.size());
+    const tf2_msgs_msg_dds__TFMessage_ message{{count, count, transforms.data(), false}};
+    dds_write(writers.at(waiting[0][0]), &message);
+    waiting.clear();
+  }
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -187,6 +219,8 @@ int main(int argc, char** argv) {
   app.add_option("--bytes", cloud.bytes);
   app.add_option("--x-offset", cloud.x_offset);
   app.add_flag("--big-endian", cloud.is_bigendian);
+  bool writes_transforms = false;
+  app.add_flag("--transforms", writes_transforms, "write transforms of standard input to /tf and /tf_static");
   app.add_flag("--stamps", stamps, "topic, stamp, time of arrival (ns), bytes");
   app.add_flag("--best-effort", sensor, "ask for no more than sensors' QoS");
   app.add_flag("--latched", latched, "ask for what was said before");
@@ -194,6 +228,7 @@ int main(int argc, char** argv) {
   std::signal(SIGTERM, [](int) { ended = true; });  // the others are told then
   const Network network(domain);
   if (!written.empty()) return write_clouds(network, written, cloud, seconds);
+  if (writes_transforms) return write_transforms(network);
   if (!service.empty()) return call(network, service);
   std::vector<dds_entity_t> readers;
   const Quality quality = latched ? Quality::kLatched : sensor ? Quality::kBestEffort : Quality::kSensor;

@@ -36,9 +36,10 @@ using namespace std::chrono_literals;
 
 constexpr int kDenseCloudBytes = 10 << 20;
 constexpr std::uint8_t kCycloneVendor[] = {0x01, 0x10};
-constexpr auto kHearing = 1s;     // time to discover a client's reply reader
-constexpr auto kBlockingMax = 5;  // seconds that a write waits until the previous one is sent
-constexpr auto kBacklogMax = 1s;  // time for earlier data to be sent
+constexpr int kTransformsKept = 100;  // as tf2 does
+constexpr auto kHearing = 1s;         // time to discover a client's reply reader
+constexpr auto kBlockingMax = 5;      // seconds that a write waits until the previous one is sent
+constexpr auto kBacklogMax = 1s;      // time for earlier data to be sent
 
 /// Samples of any type, as bytes.
 class BytesType : public fast::TopicDataType {
@@ -75,7 +76,7 @@ void set_quality(Qos& qos, Quality quality, bool best_effort) {
   qos.reliability().max_blocking_time = {kBlockingMax, 0};
   qos.durability().kind = latched ? fast::TRANSIENT_LOCAL_DURABILITY_QOS : fast::VOLATILE_DURABILITY_QOS;
   qos.history().kind = fast::KEEP_LAST_HISTORY_QOS;
-  qos.history().depth = latched ? 1 : sensor ? 5 : 10;
+  qos.history().depth = latched ? 1 : sensor ? 5 : quality == Quality::kTransforms ? kTransformsKept : 10;
   qos.resource_limits().allocated_samples = qos.history().depth;
   qos.data_sharing().off();
   qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
@@ -106,6 +107,8 @@ fast::DataWriterQos writer_qos(const ros::Type& type, Quality quality, bool best
 fast::DataReaderQos reader_qos(const ros::Type& type, Quality quality, bool best_effort) {
   fast::DataReaderQos qos;
   set_quality(qos, quality, best_effort);
+  // One history serves all writers of the topic.
+  if (quality == Quality::kLatched) qos.history().depth = qos.resource_limits().allocated_samples = kTransformsKept;
   set_type_hash(qos, type);
   qos.reliable_reader_qos().times.heartbeatResponseDelay = eprosima::fastrtps::Duration_t(0.001);
   return qos;

@@ -19,9 +19,10 @@
 namespace slsd::dds {
 
 enum class Quality {
-  kSensor,   ///< clouds and images: the newest five; for readers with sensor or reliable QoS
-  kService,  ///< requests, replies and diagnostics: reliable, the newest ten
-  kLatched,  ///< transforms: reliable, also for later readers
+  kSensor,      ///< clouds and images: the newest five; for readers with sensor or reliable QoS
+  kService,     ///< requests, replies and diagnostics: reliable, the newest ten
+  kLatched,     ///< fixed transforms and descriptions: reliable, also for later readers; these keep a hundred
+  kTransforms,  ///< moving transforms: reliable, the newest hundred
 };
 
 /// The writer of a sample, and the data that relates a reply to it.
