@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "clients/slsctl/output.hpp"
+#include "core/calibrate/watch/drift_watch.hpp"
 #include "core/printable.hpp"
 #include "daemon/rpc/message.hpp"
 
@@ -29,8 +30,10 @@ std::string drift_line(const json& camera) {
   const json drift = camera.value("calibration", json());
   if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return {};
   return fmt::format(
-      "            knocked out of its calibration since scan {}: {:.2f} px off the epipolar lines, {:.2f} are fine\n",
-      drift.value("off_since_scan", std::uint64_t{0}), drift.value("epipolar_px", 0.0), drift.value("limit_px", 0.0));
+      "            knocked out of its calibration since scan {}: {:.2f} px off the epipolar lines, {:.2f} are fine\n"
+      "            {}\n",
+      drift.value("off_since_scan", std::uint64_t{0}), drift.value("epipolar_px", 0.0), drift.value("limit_px", 0.0),
+      kKnockRemedy);
 }
 
 std::string device_line(const json& device) {

@@ -12,6 +12,7 @@
 #include "clients/connection/connection.hpp"
 #include "core/calibrate/doubt/calibration_doubts.hpp"
 #include "core/calibrate/doubt/frame_doubt.hpp"
+#include "core/calibrate/watch/drift_watch.hpp"
 #include "core/decode/symbols/symbol_warnings.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/dense/dense_outlook.hpp"
@@ -407,9 +408,8 @@ class Check {
 
   void check_drift(const std::string& name, const json& drift) {
     if (!drift.is_object() || !drift.value("off_since_scan", json()).is_number()) return;
-    findings_.warn(fmt::format(
-        "{}: knocked out of its calibration since scan {}: fasten it and the projector, then calibrate again", name,
-        drift.value("off_since_scan", std::uint64_t{0})));
+    findings_.warn(fmt::format("{}: knocked out of its calibration since scan {}: {}", name,
+                               drift.value("off_since_scan", std::uint64_t{0}), kKnockRemedy));
   }
 
   /// The projector's name in the latency report; empty if unknown.

@@ -7,15 +7,17 @@ import os
 import pathlib
 import signal
 import tempfile
+import types
 import unittest
 
 import numpy as np
 
 from browser import Browser, is_there
+from impostor import Impostor, result
 from page_service import Web
 from path_proxy import PathProxy
 from point_cloud import vertices
-from service import Service, wait_until
+from service import Service, slsctl, wait_until
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 READY = "document.getElementById('state').textContent === 'Ready to scan.'"
@@ -143,6 +145,21 @@ class Adversity(unittest.TestCase):
                 finally:
                     hung.send_signal(signal.SIGCONT)
                 browser.wait(READY, f"{what} is not back")
+
+    def test_a_knocked_camera_names_the_remedy(self):
+        with Service() as service, service.client() as client:
+            service.wait_ready()
+            told = {method: client.call(method)[0] for method in ("status", "settings", "presets")}
+        told["status"]["cameras"][0]["calibration"] = {"epipolar_px": 0.9, "limit_px": 0.25, "off_since_scan": 7, "scans": 40}
+        with Impostor(lambda request: result(request, **told.get(request["method"], {}))) as impostor:
+            status = slsctl("--socket", impostor.path, "status").stdout
+            self.assertRegex(status, r"since scan 7: 0\.90 px off .*\n +fasten .* slsd --correct with a board in view")
+            with Web(types.SimpleNamespace(socket=impostor.path)) as web, Browser() as browser:
+                browser.open(web.address)
+                browser.wait("/since scan 7: .*0.90 px off.* slsd --correct with a board/.test(document.getElementById('device-list')"
+                             ".textContent)", "no remedy")
+                self.assertEqual(browser.run("return document.getElementById('state').textContent;"),
+                                 "Knocked out of its calibration: clouds may be wrong.")
 
     def test_several_scanners_lie_below_paths_of_one_name(self):
         with Service() as left, Service() as right, Web(left) as one, Web(right) as other, \

@@ -219,6 +219,11 @@ class Catalogue(unittest.TestCase):
         self.assertEqual(sorted(ids), sorted(explained))
         self.assertEqual(len(set(ids)), len(ids))
 
+    def test_names_the_remedy_of_a_knock(self):
+        knock = re.search(r'kKnocked = "([0-9a-f]{32})"', (SOURCE / "daemon/scan/message_ids.hpp").read_text(encoding="utf-8"))[1]
+        entry = self.FILE.read_text(encoding="utf-8").split(f"-- {knock}")[1].split("\n-- ")[0]
+        self.assertIn("\n    slsd --correct\n", entry)
+
     def test_is_read_by_journalctl(self):
         if not shutil.which("journalctl"):
             self.skipTest("no journalctl here (package systemd)")

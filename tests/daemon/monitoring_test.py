@@ -100,6 +100,10 @@ class Monitoring(unittest.TestCase):
             known = {label for name in re.findall(r"slsd_\w+", rule["expr"]) for label in documented_labels()[name]}
             self.assertLessEqual(set(of_alert) - OF_PROMETHEUS, known, rule["alert"])
 
+    def test_the_alert_of_a_knock_names_the_remedy(self):
+        knocked = next(rule for rule in alerts() if rule["alert"] == "SlsdCameraKnocked")
+        self.assertIn("`slsd --correct`", knocked["annotations"]["description"])
+
     def test_the_panels_lie_beside_each_other(self):
         taken = set()
         for panel in panels():

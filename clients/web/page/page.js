@@ -132,8 +132,8 @@ function deviceItem(device, what) {
   const drift = device.calibration;
   if (drift && drift.off_since_scan !== null) {
     item.append(element("span", `Knocked out of its calibration since scan ${drift.off_since_scan}: points lie ` +
-      `${drift.epipolar_px.toFixed(2)} px off, ${drift.limit_px.toFixed(2)} are fine. Fasten projector and camera, run ` +
-      "slsd --verify, and calibrate again.", "remedy bad"));
+      `${drift.epipolar_px.toFixed(2)} px off, ${drift.limit_px.toFixed(2)} are fine. Fasten projector and camera, stop the ` +
+      "service and run slsd --correct with a board in view. If it refuses, calibrate again.", "remedy bad"));
   }
   return item;
 }

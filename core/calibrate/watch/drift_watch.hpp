@@ -13,6 +13,12 @@
 
 namespace slsd {
 
+/// The remedy for a knocked rig, in every message about one.
+inline constexpr const char* kKnockRemedy =
+    "fasten projector and camera, stop the service and run slsd --correct with a board in view; if it refuses, "
+    "calibrate "
+    "again";
+
 /// Evidence from scans about one camera's calibration.
 struct DriftState {
   std::uint64_t scans = 0;  ///< number of scans with enough points

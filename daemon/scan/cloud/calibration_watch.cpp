@@ -22,8 +22,8 @@ void log_change(DriftWatch::Change change, const std::string& camera, const Drif
   const MessageId id(MessageId::kKnocked);
   spdlog::warn(
       "camera {}: knocked out of its calibration since scan {}: points lie {:.2f} px off their epipolar lines, {:.2f} "
-      "px are fine; fasten projector and camera, run slsd --verify, and calibrate again",
-      camera, *state.off_since_scan, state.epipolar_px, state.limit_px);
+      "px are fine; {}",
+      camera, *state.off_since_scan, state.epipolar_px, state.limit_px, kKnockRemedy);
 }
 
 }  // namespace

@@ -2,7 +2,12 @@
 // Copyright the slsd authors
 #include "daemon/scan/cloud/reconstruct.hpp"
 
-#include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <sstream>
+
+#include <gmock/gmock.h>
 #include <Eigen/Geometry>
 
 #include "daemon/scan/cloud/calibration_watch.hpp"
@@ -76,6 +81,20 @@ TEST(CalibrationWatch, NamesAKnockThatLeavesNoPoints) {
   const DriftState state = watch.states().front();
   EXPECT_EQ(state.off_since_scan, 31U);
   EXPECT_NEAR(state.epipolar_px, kKnockMrad / 1000 * paper_rig().projector.fy, 0.7);
+}
+
+TEST(CalibrationWatch, LogsTheRemedyOfAKnock) {
+  std::ostringstream log;
+  const auto logger_before = spdlog::default_logger();
+  spdlog::set_default_logger(
+      std::make_shared<spdlog::logger>("", std::make_shared<spdlog::sinks::ostream_sink_st>(log)));
+  const auto setup = setup_before();
+  const ScanResult knocked = scan(*setup, seen_of(setup->pattern, knocked_rig()));
+  CalibrationWatch watch;
+  for (std::uint64_t number = 1; number < 150; ++number) watch.note(setup, knocked, number);
+  spdlog::set_default_logger(logger_before);
+  EXPECT_THAT(log.str(), testing::AllOf(testing::HasSubstr("knocked out of its calibration since scan"),
+                                        testing::HasSubstr("run slsd --correct")));
 }
 
 }  // namespace
