@@ -53,16 +53,16 @@ PlainCell plain_cell(const SurfaceGrid& grid, int column, int row, int x, int y)
     const int right = corner % 2, down = corner / 2;
     const SurfaceNode* node = grid.good(column + right, row + down);
     if (node == nullptr) return cell;
-    const auto at = [&](double dx, double dy) {
+    const auto at = [&](double dx, double dy, double of_slopes) {
       return static_cast<double>(node->plane.inverse_depth) +
-             (dx - right * stride) * static_cast<double>(node->plane.slope_x) +
-             (dy - down * stride) * static_cast<double>(node->plane.slope_y);
+             of_slopes * ((dx - right * stride) * static_cast<double>(node->plane.slope_x) +
+                          (dy - down * stride) * static_cast<double>(node->plane.slope_y));
     };
-    least = std::min(least, at(middle, middle)), most = std::max(most, at(middle, middle));
+    least = std::min(least, at(middle, middle, 1)), most = std::max(most, at(middle, middle, 1));
     noise = std::max(noise, static_cast<double>(node->noise_px));
     support = std::min(support, static_cast<double>(node->support));
     const double share = (right != 0 ? x / stride : 1 - x / stride) * (down != 0 ? y / stride : 1 - y / stride);
-    value += share * at(x, y), sigma += share * static_cast<double>(node->sigma_px);
+    value += share * at(x, y, 0.5), sigma += share * static_cast<double>(node->sigma_px);
     cell.light += share * static_cast<double>(node->gain + node->offset);
   }
   const double per_px = static_cast<double>(grid.good(column, row)->per_px);
@@ -135,6 +135,37 @@ TEST_P(BlendCells, DropsPixelsOutsideTheRangeOfDepths) {
       ASSERT_TRUE(std::isnan(map.depth_mm[i]));
     }
   }
+}
+
+TEST_P(BlendCells, ContinuesASurfaceOfTheSecondOrderExactly) {
+  const Calibration rig = eighth_rig();
+  const PatchGeometry geometry(rig.cameras[0], rig.projector);
+  SurfaceGrid grid(geometry, {GetParam(), 11, 400, 2500});
+  CellBlender blender(grid, 400, 2500);
+  const auto inverse_depth = [](double x, double y) {
+    return 1e-3 - 1e-10 * (x - 100) * (x - 100) - 2e-10 * (y - 75) * (y - 75) + 1.5e-10 * (x - 100) * (y - 75);
+  };
+  draw_nodes(grid, 5);
+  for (int row = 0; row < grid.rows(); ++row) {
+    for (int column = 0; column < grid.columns(); ++column) {
+      const double x = grid.x_of(column), y = grid.y_of(row);
+      grid.nodes()[static_cast<std::size_t>(row) * grid.columns() + column].plane = {
+          static_cast<float>(inverse_depth(x, y)), static_cast<float>(-2e-10 * (x - 100) + 1.5e-10 * (y - 75)),
+          static_cast<float>(-4e-10 * (y - 75) + 1.5e-10 * (x - 100))};
+    }
+  }
+  DenseMap map;
+  map.reset(rig.cameras[0].lens.width_px, rig.cameras[0].lens.height_px);
+  blender.begin(255);
+  for (int row = -1; row < grid.rows(); ++row) (void)blender.blend_row(grid, row, map);
+  std::size_t blended = 0;
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) {
+    if (!map.measured(i)) continue;
+    ++blended;
+    const auto x = static_cast<double>(i % map.width), y = static_cast<double>(i / map.width);
+    ASSERT_NEAR(map.depth_mm[i] * inverse_depth(x, y), 1, 4e-7) << x << ' ' << y;  // the rounding of floats
+  }
+  EXPECT_GT(blended, 5000U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Strides, BlendCells, testing::Values(1, 3, 4, 8, 11));
