@@ -21,8 +21,8 @@ class Profile(unittest.TestCase):
         out = subprocess.run([PROGRAM, f"{SOURCES}/tests/corpus/8px-6-dense-step-bright/frame.png", "--repeat", "2"],
                              capture_output=True, text=True, check=True).stdout
         rows = {line.split()[0]: line.split()[1:] for line in out.splitlines()}
-        stages = ("decode", "find_blur", "grow", "search", "fuse", "judge", "clean")
-        for stage in (*stages, "whole", "anchor"):
+        stages = ("binarize", "find_regions", "decode_windows", "review", "find_blur", "grow", "search", "fuse", "judge", "clean")
+        for stage in (*stages, "decode", "dense", "whole", "anchor"):
             self.assertGreater(float(rows[stage][0]), 0, stage)
         self.assertAlmostEqual(float(rows["anchor"][2]), 1)
         self.assertGreater(int(re.search(r"^(\d+) points", out, re.M)[1]), 100000)
