@@ -3,6 +3,7 @@
 #include "core/decode/decoder.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 
 #include "core/decode/centres/align_symbols.hpp"
@@ -14,6 +15,12 @@
 #include "core/image_size.hpp"
 
 namespace slsd {
+namespace {
+
+/// Evidence for a cell comes from its window and those that link it with others.
+constexpr float kCellsAround = 6;
+
+}  // namespace
 
 /// A copy is for another thread.
 struct Decoder::Parts {
@@ -93,6 +100,13 @@ Decoder Decoder::another() const {
 
 std::uint8_t Decoder::camera_index() const {
   return parts_->camera_index;
+}
+
+void Decoder::set_part(const std::optional<PixelRectangle>& part) {
+  const auto around_px = static_cast<int>(std::lround(
+      kCellsAround * static_cast<float>(parts_->reader.pattern().pitch_px()) * parts_->reader.expected_scale()));
+  const bool has_pixels = part && !part->empty();
+  parts_->reader.set_part(has_pixels ? part->widened(around_px, parts_->camera.lens) : part);
 }
 
 Result<> Decoder::check_size(const GreyView& frame) const {

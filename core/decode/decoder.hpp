@@ -16,6 +16,7 @@
 #include "core/executor.hpp"
 #include "core/exposure/frame_noise.hpp"
 #include "core/geometry/calibration.hpp"
+#include "core/geometry/measured_box.hpp"
 #include "core/geometry/pixel_ray.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
@@ -51,6 +52,10 @@ class Decoder {
   ~Decoder();
 
   [[nodiscard]] std::uint8_t camera_index() const;  ///< index in the calibration
+
+  /// Limits decoding to these pixels of the frame, with some cells around them as evidence; empty: all of them. The
+  /// symbols there get the points that they have in the whole frame. Symbols further away have no regions.
+  void set_part(const std::optional<PixelRectangle>& part);
 
   /// Decodes an image to points. The result is valid until the next call. If nothing is found, the result is empty,
   /// with its counters.

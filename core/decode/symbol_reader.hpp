@@ -41,6 +41,8 @@ class SymbolReader {
 
   /// Replaces the expected frames by others of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { finder_.expect(std::move(expected)); }
+  /// Reads these pixels of the frame only; empty: all of them. See ShapeFinder.
+  void set_part(const std::optional<PixelRectangle>& part) { finder_.set_part(part); }
   [[nodiscard]] float expected_scale() const { return finder_.expected().in_the_middle().scale; }
 
   /// Runs all stages in order.

@@ -182,6 +182,10 @@ void DenseMapper::set_part(const std::optional<PixelRectangle>& part) {
   of_part_.reset(new DenseMapper(fixed_->of_part(around, stride)));
 }
 
+std::optional<PixelRectangle> DenseMapper::part_of_symbols() const {
+  return part_ && !part_->empty() ? around_part_ : part_;
+}
+
 /// Measures the surface from the seeds, in a frame whose blur, offset and tone curve are known.
 /// @param within  pixels that matter
 /// @param from    the previous frame of a stream; null if there is none

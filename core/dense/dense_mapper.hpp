@@ -63,6 +63,8 @@ class DenseMapper {
   /// frame, except where only surfaces outside the part hide them from the projector. In a stream, too, each frame of a
   /// part is measured afresh.
   void set_part(const std::optional<PixelRectangle>& part);
+  /// Pixels whose symbols matter for the part; nothing: all of them.
+  [[nodiscard]] std::optional<PixelRectangle> part_of_symbols() const;
 
   /// Frees what measure_next() keeps of frames. @thread reentrant, even during measurements
   void end_stream() { follower_.forget(); }

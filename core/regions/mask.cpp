@@ -16,4 +16,20 @@ Mask::Mask(const ImageView<std::uint8_t>& image) : Mask(image.width, image.heigh
   }
 }
 
+void Mask::keep(int left, int top, int right, int bottom) {
+  const int words = words_across(width_);
+  for (int y = 0; y < height_; ++y) {
+    const bool inside = y >= top && y < bottom && left < right;
+    for (int word = 0; word < words; ++word) {
+      const int first = std::clamp(left - word * kWordPx, 0, kWordPx);
+      const int last = std::clamp(right - word * kWordPx, 0, kWordPx);
+      if (!inside || first >= last) {
+        row(y)[word] = 0;
+      } else {
+        row(y)[word] &= (~std::uint64_t{0} >> (kWordPx - (last - first))) << first;
+      }
+    }
+  }
+}
+
 }  // namespace slsd

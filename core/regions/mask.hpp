@@ -34,6 +34,8 @@ class Mask {
   void light(int x, int y) { row(y)[x / kWordPx] |= std::uint64_t{1} << (x % kWordPx); }
   /// @param image  255 where lit, 0 elsewhere
   explicit Mask(const ImageView<std::uint8_t>& image);
+  /// Makes all pixels dark outside a rectangle within the mask; right and bottom are one past the last.
+  void keep(int left, int top, int right, int bottom);
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }

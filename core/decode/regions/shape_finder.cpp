@@ -86,7 +86,12 @@ GreyView ShapeFinder::binarize_faint(const GreyView& frame, double full, Executo
   return smooth;
 }
 
+PixelRectangle ShapeFinder::part() const {
+  return part_.value_or(PixelRectangle{0, 0, mask_.width(), mask_.height()});
+}
+
 void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {
+  if (part_) mask_.keep(part_->left, part_->top, part_->right, part_->bottom);
   region_finder_.find(mask_, regions_, executor);
   if (find_regions_ == Method::kPaper) return;
   separator_.separate_all(frame, std::max(binarizer_.contrast_min(0), kContrastMin * frame_levels_), regions_,
@@ -105,8 +110,9 @@ bool ShapeFinder::is_too_large(const Region& region, float scale) const {
 }
 
 DecodeRule ShapeFinder::judge_size(const Region& region) const {
-  const bool at_border =
-      region.left == 0 || region.top == 0 || region.right == mask_.width() - 1 || region.bottom == mask_.height() - 1;
+  const PixelRectangle seen = part();
+  const bool at_border = region.left == seen.left || region.top == seen.top || region.right == seen.right - 1 ||
+                         region.bottom == seen.bottom - 1;
   if (rules_.apply(DecodeRule::kTouchesBorder, at_border)) return DecodeRule::kTouchesBorder;
   const float scale = scale_at(region), symbol_px = symbol_size_px_ * scale;
   const bool small =

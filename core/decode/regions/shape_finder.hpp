@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "core/decode/regions/separate_regions.hpp"
 #include "core/decode/regions/sharpen.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
+#include "core/geometry/measured_box.hpp"
 #include "core/regions/find_regions.hpp"
 #include "core/regions/mask.hpp"
 
@@ -31,6 +33,9 @@ class ShapeFinder {
   /// Replaces the expected frames by others of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { expected_ = std::move(expected); }
   [[nodiscard]] const ExpectedFrames& expected() const { return expected_; }
+  /// Finds shapes among these pixels of the frame only; empty: among all. Noise, blur and thresholds are those of the
+  /// whole frame.
+  void set_part(const std::optional<PixelRectangle>& part) { part_ = part; }
 
   /// Sharpens a frame that is out of focus first.
   /// @param full  the level of a saturated pixel of the frame
@@ -58,6 +63,7 @@ class ShapeFinder {
   [[nodiscard]] float edge_blur_px() const { return edge_blur_px_; }
 
  private:
+  [[nodiscard]] PixelRectangle part() const;
   GreyView binarize_blurred(const GreyView& frame, double full, Executor& executor);
   GreyView binarize_faint(const GreyView& frame, double full, Executor& executor);
   [[nodiscard]] float scale_at(const Region& region) const;
@@ -73,6 +79,7 @@ class ShapeFinder {
   RegionFinder region_finder_;
   RegionSeparator separator_;
   std::vector<GreyMomentMeter> meters_;
+  std::optional<PixelRectangle> part_;
 
   Mask mask_;
   Regions regions_;

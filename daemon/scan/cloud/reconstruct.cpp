@@ -91,23 +91,28 @@ void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& re
   if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
 }
 
+/// Limits the next frame to the pixels that can see the box, if there is one.
+/// @param mapper  null without a dense cloud
+void limit_to_box(const CloudPart& part, const ScanSetup& setup, Decoder& decoder, DenseMapper* mapper) {
+  std::optional<PixelRectangle> pixels;
+  if (part.box) {
+    const CalibratedCamera& camera = setup.calibration->cameras[decoder.camera_index()];
+    pixels = pixels_of_box(*part.box, camera, setup.depth_min_mm, setup.depth_max_mm).value_or(PixelRectangle{});
+  }
+  if (mapper != nullptr) mapper->set_part(pixels);
+  decoder.set_part(mapper != nullptr ? mapper->part_of_symbols() : pixels);
+}
+
 /// A point for each pixel of a camera, from the symbols of its frame.
-DenseView measure_pixels(const GreyView& frame, Decoder& decoder, ScanSetup& setup, std::size_t lane,
-                         std::size_t camera, const SceneLight& light, const CloudPart& part, bool next_of_stream,
-                         ScanResult& result) {
-  DenseMapper& mapper = setup.dense->of(lane, camera, decoder, setup.pattern, *setup.calibration, setup.decode);
+DenseView measure_pixels(const GreyView& frame, Decoder& decoder, DenseMapper& mapper, ScanSetup& setup,
+                         std::size_t camera, const SceneLight& light, bool next_of_stream, ScanResult& result) {
   DecodedSymbols symbols = decoder.symbols();
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may come from the quotient image
-  const CalibratedCamera& calibrated = setup.calibration->cameras[decoder.camera_index()];
-  std::optional<PixelRectangle> pixels;
-  if (part.box)
-    pixels = pixels_of_box(*part.box, calibrated, setup.depth_min_mm, setup.depth_max_mm).value_or(PixelRectangle{});
-  mapper.set_part(pixels);
   DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
                                  : mapper.measure(frame, light.full, symbols, *setup.crew);
   DenseView view{std::exchange(map, setup.dense->spare_map()),
                  mapper.rays(),
-                 calibrated.rig_from_camera,
+                 setup.calibration->cameras[decoder.camera_index()].rig_from_camera,
                  decoder.camera_index(),
                  setup.camera_names[camera],
                  mapper.epipolar_offset_px()};
@@ -147,6 +152,9 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     Decoder& decoder = setup.lanes[lane][i];
     result.full_levels.push_back(full_level_of(set, setup, i));
     const SceneLight light = light_of(set, i, result.full_levels.back());
+    DenseMapper* mapper =
+        dense ? &setup.dense->of(lane, i, decoder, setup.pattern, *setup.calibration, setup.decode) : nullptr;
+    limit_to_box(part, setup, decoder, mapper);
     const auto decoding = decode_in_light(decoder, set.frames[i].image(), light, &clock, setup.crew.get());
     result.decode_time += steady_clock::now() - begin;
     if (!decoding) {
@@ -161,7 +169,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     if (dense) {
       const auto dense_begin = steady_clock::now();
       dense->views.push_back(
-          measure_pixels(set.frames[i].image(), decoder, setup, lane, i, light, part, request.of_stream, result));
+          measure_pixels(set.frames[i].image(), decoder, *mapper, setup, i, light, request.of_stream, result));
       const auto took = steady_clock::now() - dense_begin;
       result.dense_time += took, result.decode_time += took;
     }
@@ -180,8 +188,10 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     result.dense = std::move(dense);
   }
   result.stage_times = clock.times();
-  if (result.cloud.points.empty()) result.empty = why_empty(set, setup, lane, request, result);
-  if (!result.cloud.points.empty()) {
+  if (result.cloud.points.empty()) {
+    result.empty = why_empty(set, setup, lane, request, result);
+    if (part.box) result.empty = "in the part of the picture that can see the box: " + result.empty;
+  } else {
     std::vector<double> depths_mm;
     for (const CloudPoint& point : result.cloud.points) depths_mm.push_back(point.z);
     const auto sigma_mm = setup.calibration->report.depth_sigma_mm(median_of(std::move(depths_mm)));
