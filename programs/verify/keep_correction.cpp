@@ -20,7 +20,8 @@ namespace {
 using std::filesystem::path;
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
-constexpr const char* kWhenInForce = "A running service takes it with slsctl reload; a stopped one at its next start";
+constexpr const char* kWhenInForce =
+    "A running service takes it with systemctl reload slsd; a stopped one at its next start";
 
 path uncorrected(path file) {
   file += ".uncorrected";
