@@ -29,7 +29,8 @@ int main(int argc, char** argv) {
   slsd::add_hand_eye_options(*app.add_subcommand("hand-eye", slsd::kHandEyePurpose), request);
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   FLAGS_minloglevel = google::GLOG_FATAL;  // the result is judged anyway, so Ceres need not warn
-  const auto done = request.pose.empty() ? slsd::hand_eye_from_files(request) : slsd::hand_eye_by_socket(request);
+  const bool by_socket = request.from_service || !request.pose.empty();
+  const auto done = by_socket ? slsd::hand_eye_by_socket(request) : slsd::hand_eye_from_files(request);
   if (done) return slsd::kDone;
   if (request.json) {
     const nlohmann::json error{{"error", slsd::rpc_error(done.error()).to_json()}};

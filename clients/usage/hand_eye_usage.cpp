@@ -27,6 +27,10 @@ void add_hand_eye_options(CLI::App& command, HandEyeRequest& request) {
   command
       .add_option("--config", request.configuration_file, "the service's configuration, which names the calibration")
       ->type_name("FILE");
+  command.add_flag("--service", request.from_service,
+                   "take the calibration in force from the service, and propose a pose if poses are missing");
+  command.add_flag("--looks", request.looks,
+                   "with --json: first print an object for each look, with the board's points");
   CLI::Option* board =
       command.add_option("--board", request.board, "the board; slsd(8) lists the kinds (the calibration's)");
   command.add_option("--ruler", request.ruler, "the length on the print's ruler, and what it measures, in mm")

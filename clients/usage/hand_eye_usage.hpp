@@ -23,7 +23,9 @@ struct HandEyeRequest {
   std::optional<double> distance_mm;  ///< working distance for the verdict; empty: that of the boards
   std::vector<std::string> without;   ///< names of poses to leave out
   std::vector<double> pose;           ///< the robot's numbers: takes a picture with the service first; empty: none
-  std::filesystem::path socket;       ///< the service's; with `pose`
+  std::filesystem::path socket;       ///< the service's; with `pose` or `from_service`
+  bool from_service = false;          ///< takes the calibration in force from the service, also without `pose`
+  bool looks = false;                 ///< with `json`: prints an object for each look first
   bool json = false;
 };
 

@@ -35,10 +35,19 @@ namespace {
 
 constexpr std::size_t kCalibrationBytes = 1 << 20;
 constexpr double kPrintUnmeasured = 2e-3, kPrintMeasured = 3e-4;  // one standard deviation of the print's scale
+constexpr double kPointsPerPx = 100;                              // a drawn point needs no more
 constexpr double kDegreesOfRad = 180 / std::numbers::pi;
 
 double degrees_of(double rad) {
   return rad * kDegreesOfRad;
+}
+
+double rounded(double value, double parts) {
+  return std::round(value * parts) / parts;
+}
+
+void print_line(const nlohmann::json& told) {
+  std::cout << told.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
 }
 
 Result<Calibration> scanner_calibration(const Configuration& configuration) {
@@ -62,8 +71,9 @@ Result<Board> board_of(const HandEyeRequest& request, const Calibration& calibra
 /// Reads the looks of a folder.
 class LookReader {
  public:
-  LookReader(const Calibration& calibration, const Board& board, std::string first_camera, bool quiet)
-      : calibration_(calibration), board_(board), first_camera_(std::move(first_camera)), quiet_(quiet) {}
+  LookReader(const Calibration& calibration, const Board& board, std::string first_camera,
+             const HandEyeRequest& request)
+      : calibration_(calibration), board_(board), first_camera_(std::move(first_camera)), request_(request) {}
 
   /// @param needed  an invisible board is an error
   /// @return  nothing if the board is not visible
@@ -96,18 +106,38 @@ class LookReader {
     if (!located) {
       if (needed) return fail(ErrorCode::kNotFound, located.error().message, pose.name);
       std::cerr << fmt::format("{}: not used: {}\n", pose.name, located.error().message);
+      if (shows_points()) print_line({{"look", pose.name}, {"unused", located.error().message}});
       return std::nullopt;
     }
-    if (!quiet_) {
-      std::cout << fmt::format("{}: {} corners at {:.0f} mm, {:.3f} px\n", pose.name, located->corners,
-                               (located->rig_from_board * located->middle_mm).norm(),
-                               std::sqrt(located->squares_px2 / located->degrees_of_freedom()))
-                << std::flush;
-    }
+    tell(pose.name, *located, sightings);
     return *located;
   }
 
  private:
+  [[nodiscard]] bool shows_points() const { return request_.json && request_.looks; }
+
+  void tell(const std::string& name, const LocatedBoard& located, const std::vector<CameraSighting>& sightings) const {
+    const double distance_mm = (located.rig_from_board * located.middle_mm).norm();
+    const double error_px = std::sqrt(located.squares_px2 / located.degrees_of_freedom());
+    if (!request_.json) {
+      std::cout << fmt::format("{}: {} corners at {:.0f} mm, {:.3f} px\n", name, located.corners, distance_mm, error_px)
+                << std::flush;
+    }
+    if (!shows_points()) return;
+    nlohmann::json cameras = nlohmann::json::array();
+    for (const CameraSighting& each : sightings) {
+      nlohmann::json points = nlohmann::json::array();
+      for (const SeenPoint& point : each.sighting.points)
+        points.push_back({rounded(point.pixel.x(), kPointsPerPx), rounded(point.pixel.y(), kPointsPerPx)});
+      cameras.push_back({{"name", calibration_.cameras[each.camera].name}, {"points_px", std::move(points)}});
+    }
+    print_line({{"look", name},
+                {"corners", located.corners},
+                {"distance_mm", distance_mm},
+                {"error_px", error_px},
+                {"cameras", std::move(cameras)}});
+  }
+
   Result<BoardSighting> look_for_board(const GreyImage& image) {
     const auto view = std::visit([](const auto& pixels) -> GreyView { return pixels.view(); }, image);
     auto sighting = find_board(view, board_);
@@ -126,7 +156,7 @@ class LookReader {
   const Calibration& calibration_;
   Board board_;
   std::string first_camera_;
-  bool quiet_;
+  const HandEyeRequest& request_;
   bool seen_ = false;  // so the board's orientation is known
 };
 
@@ -167,7 +197,7 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Scanner& 
     return fail(ErrorCode::kNotFound, "poses.csv names it, but there is no such folder",
                 (request.from / line.name).string());
   }
-  LookReader reader(scanner.calibration, scanner.board, scanner.first_camera, request.json);
+  LookReader reader(scanner.calibration, scanner.board, scanner.first_camera, request);
   std::vector<LocatedBoard> boards;
   for (const CapturedPose& capture : *captures) {
     const auto line = std::ranges::find(*lines, capture.name, &PoseLine::name);
@@ -248,7 +278,7 @@ Proposal propose(const HandEyeResult& result, const HandEyeRecord& record, const
       propose_pose(result.session, *result.fit, scanner.calibration, scanner.board, result.verdict.distance_mm);
   if (!next) return {};
   Proposal proposal{{}, robot_numbers(next->base_from_flange, record.notation)};
-  for (double& number : proposal.numbers) number = std::round(number * kNumbersPerUnit) / kNumbersPerUnit;
+  for (double& number : proposal.numbers) number = rounded(number, kNumbersPerUnit);
   proposal.text = fmt::format("next pose: {}, to {:.10g}; then points are placed to about {:.2f} mm",
                               describe(*next, result.session), fmt::join(proposal.numbers, ", "), next->error_mm);
   return proposal;
@@ -282,11 +312,15 @@ void tell(const HandEyeRequest& request, const HandEyeResult& result, std::size_
     told["robot_place_sigma_mm"] = result.fit->noise.place_mm;
     told["robot_turn_sigma_rad"] = result.fit->noise.turn_rad;
   }
-  std::cout << told.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
+  print_line(told);
 }
 
-/// @param added  a look that was just taken, so more may follow: too few poses or too little motion are no faults;
-///               empty: none
+/// Tells whether more looks may follow: then too few poses or too little motion are no faults.
+bool may_go_on(const HandEyeRequest& request) {
+  return request.from_service || !request.pose.empty();
+}
+
+/// @param added  the look that was just taken; empty: none
 Result<> evaluate(const HandEyeRequest& request, const Scanner& scanner, const std::string& added) {
   const auto output = request.output.empty() ? request.from / "hand_eye.yml" : request.output;
   if (auto writable = check_writable(output); !writable) return writable;
@@ -298,7 +332,7 @@ Result<> evaluate(const HandEyeRequest& request, const Scanner& scanner, const s
   const bool good = result->findings.empty() && grade(result->verdict) == HandEyeGrade::kGood;
   const Proposal next = more && !good ? propose(*result, *record, scanner) : Proposal();
   if (!result->findings.empty()) {
-    if (added.empty() || !more) return refuse(*result, next);
+    if (!may_go_on(request) || !more) return refuse(*result, next);
     tell(request, *result, record->looks.size(), next, {});
     return {};
   }
@@ -337,9 +371,11 @@ Result<> hand_eye_by_socket(const HandEyeRequest& request) {
   if (!calibration) return tl::unexpected(calibration.error());
   const auto board = board_of(request, *calibration);
   if (!board) return tl::unexpected(board.error());
+  const Scanner scanner{std::move(*calibration), *board, (*source)->cameras().front()};
+  if (request.pose.empty()) return evaluate(request, scanner, {});
   const auto look = take_look(**source, request.from, request.pose, *notation);
   if (!look) return tl::unexpected(look.error());
-  auto done = evaluate(request, {std::move(*calibration), *board, (*source)->cameras().front()}, look->name);
+  auto done = evaluate(request, scanner, look->name);
   if (done) return done;
   done.error().message += fmt::format("\n  {} is not kept", look->name);
   if (auto dropped = drop_look(request.from, *look); !dropped) return dropped;

@@ -152,6 +152,33 @@ class HandEye(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertIn(pathlib.Path("pose_04/white.png"), self.files())
 
+    def test_without_a_pose_it_uses_the_calibration_of_the_service(self):
+        with self.service_seeing(*range(5)) as service:
+            words = ["--socket", service.socket, "hand-eye", "--mounted", "arm", "--poses", "kuka", "--from", self.captures, "--service"]
+            self.assertEqual(self.hand_eye(service, kuka(self.poses[0])).returncode, 0)
+            early = slsctl("--json", *words, "--looks")
+            self.assertEqual(early.returncode, 0, early.stderr)  # too few poses are no error
+            self.assertIn("too few", json.loads(early.stdout.splitlines()[-1])["missing"])
+            for pose in self.poses[1:5]:
+                last = self.hand_eye(service, kuka(pose), options=["--json"])
+            *looks, told = map(json.loads, slsctl("--json", *words, "--looks").stdout.splitlines())
+            self.assertEqual(told, json.loads(last.stdout))
+            self.assertEqual([look["look"] for look in looks], [f"pose_{i:02}" for i in range(5)])
+            for i, look in enumerate(looks):
+                self.check_points(look, numpy.linalg.inv(self.poses[i] @ FLANGE_FROM_RIG) @ BASE_FROM_BOARD)
+            self.assertEqual(slsctl("--json", *words).stdout, last.stdout)
+            (self.captures / "pose_02/white.png").write_bytes((self.captures / "pose_02/white.png").read_bytes()[:100])
+            self.assertEqual(slsctl(*words).returncode, 1)
+
+    def check_points(self, look, rig_from_board):
+        """As many as it says, and no further apart than the board is wide."""
+        points = numpy.array(look["cameras"][0]["points_px"])
+        self.assertEqual((len(look["cameras"]), len(points)), (1, look["corners"]))
+        self.assertTrue((points.min() > -0.5) and (points.max(axis=0) < (799.5, 599.5)).all())
+        self.assertLess(look["error_px"], 0.2)
+        middle = (rig_from_board @ (210, 150, 0, 1))[:3]
+        self.assertLess(abs(look["distance_mm"] - numpy.linalg.norm(middle)), 60)
+
     def test_poses_of_another_arm_are_named(self):
         random = numpy.random.default_rng(4)
         others = [motion(turn(random.normal(size=3), random.uniform(0.3, 2)), random.uniform(-800, 800, 3)) for _ in range(5)]
