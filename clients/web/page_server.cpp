@@ -34,6 +34,7 @@ constexpr double kSymbolsHz = 15.0, kPixelsHz = 5.0;
 constexpr std::size_t kPastMax = 50;
 constexpr std::size_t kPastBytesMax = 48 << 20;
 constexpr std::size_t kScriptBytesMax = 4 << 20;
+constexpr std::size_t kResultBytesMax = 1 << 20;
 
 // What a page may ask of a scan.
 constexpr std::array<std::string_view, 8> kScanKeys = {"density", "texture", "ambient", "normals",
@@ -109,6 +110,13 @@ std::pair<std::string, std::string> cookie_header(const Session& session, const 
   return {"Set-Cookie", session.cookie + (request.by_https ? "; Secure" : "")};
 }
 
+/// The command that makes a service read its configuration again.
+std::string reload_command(const std::filesystem::path& configuration, int process) {
+  if (configuration.parent_path() != "/etc/slsd") return "sudo kill -HUP " + std::to_string(process);
+  const std::string name = configuration.stem().string();
+  return "sudo systemctl reload slsd" + (name == "slsd" ? "" : "@" + name);
+}
+
 bool is_density(const std::string& text) {
   return text == "symbols" || text == "pixels";
 }
@@ -123,7 +131,8 @@ PageServer::PageServer(PageOptions options, Token token)
     : options_(std::move(options)),
       token_(std::move(token)),
       symbols_(options_.socket, "symbols", kSymbolsHz),
-      pixels_(options_.socket, "pixels", kPixelsHz) {
+      pixels_(options_.socket, "pixels", kPixelsHz),
+      hand_eye_(options_.looks, options_.socket) {
   add_pages();
   add_requests();
 }
@@ -255,6 +264,17 @@ void PageServer::add_requests() {
   get("/api/calibration", [this](const Request&) {
     return result_or_refusal(call("calibrate", {{"action", "look"}}, kTimeout));
   });
+  get("/api/hand_eye", [this](const Request&) { return hand_eye(); });
+  get("/api/hand_eye/look", [this](const Request& request) { return look(request); });
+  get("/api/hand_eye/file", [this](const Request&) {
+    auto text = read_file(hand_eye_.file(), kResultBytesMax);
+    if (!text) return refusal(404, "not_found", "there is no result yet: take more looks");
+    return Answer{200, "application/yaml", client::Bytes(std::move(*text)), {}, {}};
+  });
+  post("/api/hand_eye/act", false, [this](const Request&, const json& body) {
+    const auto done = hand_eye_.act(body);
+    return done ? hand_eye() : answer_of(done.error());
+  });
   post("/api/scan", false, [this](const Request&, const json& body) { return scan(body); });
   post("/api/project", false, [this](const Request&, const json& body) {
     const auto picture = body.find("picture");
@@ -345,6 +365,31 @@ Answer PageServer::board(const Request& request) const {
     if (board.name == name) return {200, "application/pdf", client::Bytes(std::move(board.pdf)), {}, {}};
   }
   return refusal(404, "not_found", "there is no such board: choose one of the list");
+}
+
+/// The session, and where its result belongs.
+Answer PageServer::hand_eye() const {
+  json told = hand_eye_.look();
+  told["file"] = hand_eye_.file().string();
+  const auto settings = call("settings", json::object(), kTimeoutOfStatus);
+  const auto status = call("status", json::object(), kTimeoutOfStatus);
+  if (settings && status) {
+    const json configuration = settings->reply.message["result"].value("configuration", json::object());
+    const std::filesystem::path named = configuration.value("/frame/hand_eye"_json_pointer, "");
+    const std::filesystem::path by = status->reply.message["result"].value("configuration", "");
+    const auto place = by.parent_path() / (named.empty() ? "hand_eye.yml" : named);
+    told["installs_to"] = place.lexically_normal().string();
+    told["configured"] = !named.empty();
+    told["configuration"] = by.string();
+    told["reload"] = reload_command(by, status->reply.message["result"].value("process", 0));
+  }
+  return json_answer(told);
+}
+
+Answer PageServer::look(const Request& request) const {
+  auto picture = hand_eye_.picture(parameter(request, "look"), parameter(request, "camera"));
+  if (!picture) return answer_of(picture.error());
+  return {200, "image/png", client::Bytes(std::move(picture->png)), {header_about(picture->about)}, {}};
 }
 
 Answer PageServer::cloud(const Request& request) {

@@ -19,6 +19,7 @@
 
 #include "clients/web/cloud_feed.hpp"
 #include "clients/web/gate.hpp"
+#include "clients/web/hand_eye.hpp"
 #include "clients/web/http_server.hpp"
 #include "clients/web/pages.hpp"
 
@@ -32,6 +33,7 @@ struct PageOptions {
   std::filesystem::path token_file = {};                        ///< empty: a random token for this run
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
   std::filesystem::path boards = SLSD_BOARDS;                   ///< boards that are ready to print
+  std::filesystem::path looks = default_looks();                ///< of a hand-eye calibration
 };
 
 /// Tells whether only this machine can reach the address.
@@ -80,6 +82,8 @@ class PageServer {
   [[nodiscard]] Answer reasons(const Request& request) const;
   [[nodiscard]] Answer boards() const;
   [[nodiscard]] Answer board(const Request& request) const;
+  [[nodiscard]] Answer hand_eye() const;
+  [[nodiscard]] Answer look(const Request& request) const;
   [[nodiscard]] Answer cloud(const Request& request);
   [[nodiscard]] Answer scan(const nlohmann::json& body);
   [[nodiscard]] Answer past(const Request& request);
@@ -92,6 +96,7 @@ class PageServer {
   std::map<std::string, Route, std::less<>> routes_;
   CloudFeed symbols_;
   CloudFeed pixels_;
+  HandEye hand_eye_;
   std::mutex mutex_;
   std::deque<PastScan> past_;  ///< newest first
 };

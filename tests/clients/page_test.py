@@ -153,7 +153,7 @@ class Views(unittest.TestCase):
             browser.wait("/^[3-7] of 8 poses/.test(document.getElementById('calibrate-next').textContent)", "no poses")
             browser.wait("document.querySelectorAll('#calibrate-pictures figure').length === 2", "no pictures")
             browser.wait("/Calibrating|being calibrated/.test(document.getElementById('state').textContent)", "no state")
-            self.assertEqual(browser.run("return [...document.querySelectorAll('#calibrate .bar')].map((b) => b.offsetParent !== null);"),
+            self.assertEqual(browser.run("return [...document.querySelectorAll('#calibrate > .bar')].map((b) => b.offsetParent !== null);"),
                              [False, True])
             browser.picture(self.folder / "calibrating-1600.png")
             browser.resize(390, 844)

@@ -32,8 +32,8 @@ function coveredShare(coverage) {
   return coverage.counts.filter((count) => count > 0).length / coverage.counts.length;
 }
 
-function figureOf(name, width, height) {
-  const present = [...$("calibrate-pictures").children].find((figure) => figure.dataset.name === name);
+function figureOf(name, width, height, holder = $("calibrate-pictures")) {
+  const present = [...holder.children].find((figure) => figure.dataset.name === name);
   if (present) return present;
   const figure = document.createElement("figure");
   figure.dataset.name = name;
@@ -41,7 +41,7 @@ function figureOf(name, width, height) {
   canvas.width = width;
   canvas.height = height;
   figure.append(canvas, document.createElement("figcaption"));
-  $("calibrate-pictures").append(figure);
+  holder.append(figure);
   return figure;
 }
 

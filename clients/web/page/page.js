@@ -160,6 +160,7 @@ function showStatus(told) {
     offerColours();
   }
   allow($("calibrate-begin"), mayAdminister);
+  allow($("take-look"), mayAdminister);
   showPresets();
   allow($("expose"), mayAdminister);
   allow($("box-for-all"), mayKeepBox());
@@ -341,6 +342,7 @@ function begin() {
   followCamera();
   beginCalibrating();
   beginBoards();
+  beginHandEye();
   beginPresets();
   beginKeys();
   // What draws clouds is large, and would hold the picture up; a camera that is gone does not hold it up for long.
