@@ -52,3 +52,16 @@ get_ros() {
     say "rclpy and play_launch cannot be had; the tests that need them are skipped"
   fi
 } >&2
+
+# From the Python package index: independent readers of meshes, for ./run report --model.
+mesh_wheels=(numpy open3d==0.20.0 pymeshlab==2025.7.post1 trimesh==5.2.0)
+get_mesh_readers() {
+  local folder=build/mesh-venv
+  [ "$(cat $folder/wheels 2>/dev/null)" != "${mesh_wheels[*]}" ] || return 0
+  say "fetching Open3D, MeshLab and trimesh into $folder (500 MB)"
+  rm -rf $folder
+  python3 -m venv $folder
+  $folder/bin/pip install -q --disable-pip-version-check "${mesh_wheels[@]}" ||
+    die "Open3D, MeshLab and trimesh cannot be had from the Python package index"
+  echo "${mesh_wheels[*]}" >$folder/wheels
+} >&2
