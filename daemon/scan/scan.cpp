@@ -85,6 +85,8 @@ void Scan::compute(std::size_t lane) {
   result_->lost = std::move(lost_);
   result_->files = CloudFiles(result_->cloud, result_->dense.get(), request_.formats,
                               setup_->base_from_rig(request_.base_from_flange));
+  const bool on_arm = setup_->hand_eye && setup_->hand_eye->mounted == Mounted::kArm;
+  if (on_arm && setup_->check_robot_base()) result_->flange_from_rig = setup_->hand_eye->mount_from_rig;
 }
 
 FrameTask::FrameTask(FrameRequest request, Answer answer)

@@ -137,6 +137,7 @@ class RobotFrame(unittest.TestCase):
             client.call("subscribe", rate_hz=10)
             wait_until(lambda: self.next_cloud(client), "a cloud")
             numpy.testing.assert_allclose(numpy.array(self.event["base_from_rig"]).reshape(4, 4), MOUNT, atol=1e-6)
+            self.assertNotIn("flange_from_rig", self.event)
 
     def next_cloud(self, client):
         message, _ = client.receive()
@@ -162,6 +163,8 @@ class RobotFrame(unittest.TestCase):
             client.call("subscribe", rate_hz=10)  # in the rig's frame
             wait_until(lambda: self.next_cloud(client), "a cloud")
             self.assertNotIn("base_from_rig", self.event)
+            for about in (self.event, client.call("scan", coordinate_frame="rig")[0], client.call("scan", **pose)[0]):
+                numpy.testing.assert_allclose(numpy.array(about["flange_from_rig"]).reshape(4, 4), MOUNT, atol=1e-6)
 
     def test_box_and_plane_in_the_robots_base(self):
         for mounted, pose in (("cell", {}), ("arm", {"robot_pose": POSE_UR, "poses": "ur"})):

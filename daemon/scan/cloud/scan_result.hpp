@@ -110,9 +110,10 @@ struct FrameImage {
 /// The outcome of a scan.
 struct ScanResult {
   Cloud cloud;
-  std::shared_ptr<const DenseCloud> dense = {};  ///< a point per pixel, if requested; shared, as it is large
-  std::string empty = {};                        ///< why no symbol became a point, in words; empty: some did
-  CloudFiles files = {};                         ///< the cloud in the requested formats
+  std::shared_ptr<const DenseCloud> dense = {};        ///< a point per pixel, if requested; shared, as it is large
+  std::string empty = {};                              ///< why no symbol became a point, in words; empty: some did
+  CloudFiles files = {};                               ///< the cloud in the requested formats
+  std::optional<RigidTransform> flange_from_rig = {};  ///< if the scanner is on the robot's arm, and this holds
   LostTries lost = {};
   std::vector<MergedCamera> merged = {};              ///< one for each camera that takes two exposures
   std::vector<CameraLight> light = {};                ///< one for each camera; none if a white frame was divided out

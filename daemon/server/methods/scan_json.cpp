@@ -70,6 +70,11 @@ json light_json(const std::vector<CameraLight>& cameras) {
   return result;
 }
 
+// A 4x4 matrix row by row, mm.
+json matrix_json(const RigidTransform& transform) {
+  return robot_numbers(transform, {TurnNumbers::kMatrix, /*unit_mm=*/1, /*unit_rad=*/1});
+}
+
 }  // namespace
 
 double latency_ms(MonotonicTime received) {
@@ -99,6 +104,7 @@ json scan_json(const ScanResult& scan, Density density) {
   } else if (!scan.empty.empty()) {
     result["empty"] = scan.empty;
   }
+  if (scan.flange_from_rig) result["flange_from_rig"] = matrix_json(*scan.flange_from_rig);
   if (!scan.light.empty()) result["light"] = light_json(scan.light);
   if (!scan.merged.empty()) result["exposures"] = exposures_json(scan.merged);
   result["tries"] = scan.lost.count + 1;
@@ -111,8 +117,7 @@ json scan_json(const ScanResult& scan, Density density) {
 }
 
 void add_frame(json& about, const RigidTransform* base_from_rig) {
-  if (base_from_rig != nullptr)
-    about["base_from_rig"] = robot_numbers(*base_from_rig, {TurnNumbers::kMatrix, /*unit_mm=*/1, /*unit_rad=*/1});
+  if (base_from_rig != nullptr) about["base_from_rig"] = matrix_json(*base_from_rig);
 }
 
 json reasons_json(const ScanResult& scan) {
