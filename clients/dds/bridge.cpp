@@ -17,11 +17,13 @@
 #include <slsd/scanner.hpp>
 
 #include "core/calibration_file/calibration_file.hpp"
+#include "core/utc_text.hpp"
 #include "description.hpp"
 #include "drivers/files/file.hpp"
 #include "endpoints.hpp"
 #include "extrinsics.hpp"
 #include "messages.hpp"
+#include "tf/robot_poses.hpp"
 
 namespace slsd::dds {
 namespace {
@@ -51,18 +53,28 @@ Result<std::string> calibration_in_force(const std::string& socket) {
   }
 }
 
-/// base_from_rig of a cloud's description; nothing in the rig's frame.
-std::optional<RigidTransform> base_from_rig_of(const json& told) {
-  const json matrix = told.is_object() ? told.value("base_from_rig", json()) : json();
+/// A transform of a cloud's description, by its key; nothing if it has none.
+std::optional<RigidTransform> transform_of(const json& told, const char* key) {
+  const json matrix = told.is_object() ? told.value(key, json()) : json();
   const auto is_number = [](const json& each) { return each.is_number(); };
   if (!matrix.is_array() || matrix.size() != 16 || !std::all_of(matrix.begin(), matrix.end(), is_number)) return {};
-  RigidTransform base_from_rig;
+  RigidTransform transform;
   for (std::size_t row = 0; row < 3; ++row) {
     for (std::size_t column = 0; column < 3; ++column)
-      base_from_rig.rotation(static_cast<int>(row), static_cast<int>(column)) = matrix[4 * row + column];
-    base_from_rig.translation[static_cast<int>(row)] = matrix[4 * row + 3];
+      transform.rotation(static_cast<int>(row), static_cast<int>(column)) = matrix[4 * row + column];
+    transform.translation[static_cast<int>(row)] = matrix[4 * row + 3];
   }
-  return base_from_rig;
+  return transform;
+}
+
+std::string time_of_exposure(const json& told) {
+  return told.is_object() && told.contains("time") && told["time"].is_string() ? told["time"].get<std::string>()
+                                                                               : std::string();
+}
+
+// "tf_late" of "tf_late: ..."
+std::string name_of_problem(const std::string& problem) {
+  return problem.substr(0, problem.find(':'));
 }
 
 /// A camera of the scanner as the network sees it.
@@ -88,6 +100,11 @@ class Running : public Bridge {
     if (options_.transforms) make(transforms_, ros::TFMessage::kType, "rt/tf_static", Quality::kLatched, opened);
     make(description_, ros::String::kType, "rt/" + options_.name + "/robot_description", Quality::kLatched, opened);
     make(diagnostics_, ros::DiagnosticArray::kType, "rt/diagnostics", Quality::kService, opened);
+    if (!options_.flange.empty()) {
+      auto poses = RobotPoses::open(network_, {options_.robot_base, options_.flange});
+      if (!poses) return tl::unexpected(poses.error());
+      poses_ = std::move(*poses);
+    }
     auto trigger = Trigger::open(network_, options_.name);
     if (!trigger) return tl::unexpected(trigger.error());
     trigger_ = *trigger;
@@ -123,32 +140,40 @@ class Running : public Bridge {
       options.density = options_.density;
       options.shared = true;
       client::Stream stream = client::Scanner(options_.socket).stream(options);
-      while (true) publish(stream.next());
+      while (true) (void)publish(stream.next());  // diagnostics tell why one was not
     } catch (const client::ScannerError& error) {
       say(error.what());
       std::this_thread::sleep_for(kRetry);
     }
   }
 
-  void publish(const client::Cloud& cloud) {
+  // Publishes a cloud, unless its place is uncertain; its depth images need none.
+  // @errors of base_from_rig()
+  Result<> publish(const client::Cloud& cloud) {
     const json told = json::parse(cloud.description, nullptr, false);
-    const auto stamp =
-        stamp_of(told.is_object() && told.contains("time") && told["time"].is_string() ? told["time"].get<std::string>()
-                                                                                       : std::string());
+    const auto stamp = stamp_of(time_of_exposure(told));
+    const auto in_base = transform_of(told, "base_from_rig");  // the service has placed the points
+    const auto moved = in_base || !poses_ ? RigidTransform() : base_from_rig(told);
     const std::lock_guard lock(mutex_);
     lost_ += cloud.lost;
-    const auto base_from_rig = base_from_rig_of(told);
     // As if the cameras' places were in the frame of the points.
-    const auto placed = [&base_from_rig](CalibratedCamera camera) {
-      if (base_from_rig) camera.rig_from_camera = base_from_rig->after(camera.rig_from_camera);
+    const auto placed = [&in_base](CalibratedCamera camera) {
+      if (in_base) camera.rig_from_camera = in_base->after(camera.rig_from_camera);
       return camera;
     };
     std::vector<CalibratedCamera> cameras;
     std::transform(calibrated_.begin(), calibrated_.end(), std::back_inserter(cameras), placed);
-    const ros::Header of_points{stamp, base_from_rig ? options_.robot_base : frame_id_};
-    const bool written = points_.write(point_cloud(cloud, of_points, cameras, options_.thinning));
-    ++(written ? published_ : lost_);
-    if (!written && !std::exchange(overtaken_, true)) say(kOvertaken);
+    if (moved) {
+      not_placed_.clear();
+      const ros::Header of_points{stamp, in_base || poses_ ? options_.robot_base : frame_id_};
+      const bool written = points_.write(point_cloud(cloud, of_points, cameras, options_.thinning, *moved));
+      ++(written ? published_ : lost_);
+      if (!written && !std::exchange(overtaken_, true)) say(kOvertaken);
+    } else {
+      ++lost_;
+      const std::string& why = moved.error().message;
+      if (name_of_problem(why) != name_of_problem(not_placed_)) not_placed_ = why;  // the newest numbers are no news
+    }
     std::uint8_t index = 0;
     for (Camera& camera : cameras_) {
       const std::uint8_t i = index++;
@@ -161,6 +186,24 @@ class Running : public Bridge {
       camera.depth.write(depth_image(cloud, header, placed(*camera.calibrated), i, options_.thinning.stride));
       camera.depth_info.write(camera_info(*camera.calibrated, header, options_.thinning.stride));
     }
+    return moved ? Result<>() : tl::unexpected(moved.error());
+  }
+
+  // The rig's place in the robot's base when a cloud was exposed.
+  // @errors kNotFound: hand_eye_missing; kMalformed: time_missing; those of RobotPoses::at()
+  [[nodiscard]] Result<RigidTransform> base_from_rig(const json& told) const {
+    const auto flange_from_rig = transform_of(told, "flange_from_rig");
+    if (!flange_from_rig) {
+      return fail(
+          ErrorCode::kNotFound,
+          "hand_eye_missing: the service has no hand-eye calibration for the scanner on the arm, or an old one: "
+          "run slsctl hand-eye --mounted arm, set [frame] hand_eye, and run slsctl reload");
+    }
+    const auto time = time_from_utc(time_of_exposure(told));
+    if (!time) return fail(ErrorCode::kMalformed, "time_missing: the cloud does not say when it was exposed");
+    auto base_from_flange = poses_->at(*time);
+    if (!base_from_flange) return base_from_flange;
+    return base_from_flange->after(*flange_from_rig);
   }
 
   Result<> show_depth(Camera& camera) const {
@@ -176,15 +219,20 @@ class Running : public Bridge {
     try {
       client::ScanOptions options;
       options.density = options_.density;
-      if (on_arm_) options.coordinate_frame = "rig";  // the robot's pose is unknown here
+      if (on_arm_) options.coordinate_frame = "rig";  // the robot's pose is known after the exposure, or never
       const client::Cloud cloud = client::Scanner(options_.socket).scan(options);
-      publish(cloud);
+      if (const auto published = publish(cloud); !published) return {false, published.error().message};
       const std::string why = cloud.why_empty.empty() ? "" : ": " + cloud.why_empty;
       return {true, std::to_string(cloud.size()) + " points, scan " + cloud.scan + why};
     } catch (const client::ScannerError& error) {
       say(error.what());
       return {false, (error.name().empty() ? "" : error.name() + ": ") + error.what()};
     }
+  }
+
+  std::string not_placed() {
+    const std::lock_guard lock(mutex_);
+    return not_placed_;
   }
 
   void tell_state() {
@@ -214,6 +262,8 @@ class Running : public Bridge {
       if (calibration_text_.empty()) state.worse(Level::kError, "not calibrated");
       if (stale_)
         state.worse(Level::kError, "extrinsics_stale: the scanner was calibrated again since; measure where it stands");
+      if (const std::string why = not_placed(); !why.empty())
+        state.worse(Level::kError, "the last cloud is not published: " + why);
       publish_images(scanner);
     } catch (const client::ScannerError& error) {
       state.worse(Level::kError, error.what());
@@ -318,12 +368,14 @@ class Running : public Bridge {
   std::string frame_id_;
   Writer points_, transforms_, description_, diagnostics_;
   Trigger trigger_;
-  std::mutex mutex_;           ///< guards the members below, before the threads
-  std::list<Camera> cameras_;  ///< only the state thread changes this and the next member
+  std::unique_ptr<RobotPoses> poses_;  ///< only with a flange
+  std::mutex mutex_;                   ///< guards the members below, before the threads
+  std::list<Camera> cameras_;          ///< only the state thread changes this and the next member
   std::vector<CalibratedCamera> calibrated_;
   std::string calibration_text_, calibration_date_, said_;
   bool stale_ = false;
   bool overtaken_ = false;  ///< a cloud was not published
+  std::string not_placed_;  ///< why the last cloud was not, or one before by the same name; empty: it was
   std::atomic<bool> on_arm_{false};
   std::atomic<std::uint64_t> published_{0}, lost_{0};
   std::jthread clouds_, triggers_, state_;

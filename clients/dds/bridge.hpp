@@ -20,8 +20,9 @@ struct BridgeOptions {
   Thinning thinning;                     ///< reduces clouds and depth images
   double image_rate_hz = 0;              ///< of images from every camera; 0: none
   bool transforms = true;                ///< false: the robot's own description contains the scanner's frames
-  std::string robot_base = "base_link";  ///< frame of clouds that the service places in the robot's base
-  std::filesystem::path extrinsics;      ///< file with the scanner's position; empty: unknown
+  std::string robot_base = "base_link";  ///< frame of clouds in the robot's base
+  std::string flange;  ///< the frame in tf that carries the scanner, which places clouds in robot_base; empty: none
+  std::filesystem::path extrinsics;  ///< file with the scanner's position; empty: unknown
 };
 
 /// The robot description (URDF) of a scanner, from that calibration file; if empty, from the service's calibration.
@@ -29,7 +30,7 @@ struct BridgeOptions {
 [[nodiscard]] Result<std::string> describe(const BridgeOptions& options, const std::filesystem::path& file);
 
 /// One scanner in a ROS 2 network, until the process ends. Has three threads: one receives clouds, one waits for
-/// triggers, and one reads the state each second, and images.
+/// triggers, and one reads the state each second, and images. With a flange, RobotPoses has one more.
 class Bridge {
  public:
   /// @errors kInvalidArgument: not a valid ROS name; kAlreadyExists: another scanner has this name; kNotFound,

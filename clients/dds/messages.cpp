@@ -86,16 +86,21 @@ ros::Time stamp_of(std::string_view utc) {
 }
 
 ros::PointCloud2 point_cloud(const client::Cloud& cloud, const ros::Header& header,
-                             const std::vector<CalibratedCamera>& cameras, const Thinning& thinning) {
+                             const std::vector<CalibratedCamera>& cameras, const Thinning& thinning,
+                             const RigidTransform& frame_from_cloud) {
   const bool dense = !cloud.has("camera_u");
   const int stride = dense ? thinning.stride : 1;
   std::optional<VoxelGrid> voxels;
   if (thinning.voxel_mm > 0) voxels.emplace(thinning.voxel_mm);
+  const bool moves = !frame_from_cloud.rotation.isIdentity(0) ||
+                     !frame_from_cloud.translation.isZero(0);  // else bits stay as they are
   std::vector<std::uint8_t> data(kPointStep * cloud.size());
   std::uint8_t* to = data.data();
   for (const client::Point point : cloud) {
     if (!on_stride(point, cameras, stride) || (voxels && !voxels->take(point))) continue;
-    const float values[] = {point.x / 1000, point.y / 1000, point.z / 1000, point.sigma_mm / 1000,
+    Eigen::Vector3f at(point.x, point.y, point.z);
+    if (moves) at = (frame_from_cloud * at.cast<double>()).cast<float>();
+    const float values[] = {at.x() / 1000, at.y() / 1000, at.z() / 1000, point.sigma_mm / 1000,
                             static_cast<float>(point.intensity)};
     std::memcpy(to, values, sizeof values);
     to[20] = point.camera;

@@ -37,10 +37,12 @@ struct Thinning {
 
 /// Converts a cloud to metres. The axes of slsd's rig frame equal those of ROS's optical frames: x right, y down, z
 /// forward.
-/// @param cameras  of the calibration; a stride requires them
+/// @param cameras  of the calibration, in the frame of the cloud; a stride requires them
+/// @param frame_from_cloud  moves the points into another frame
 /// @thread reentrant
 [[nodiscard]] ros::PointCloud2 point_cloud(const client::Cloud& cloud, const ros::Header& header,
-                                           const std::vector<CalibratedCamera>& cameras, const Thinning& thinning);
+                                           const std::vector<CalibratedCamera>& cameras, const Thinning& thinning,
+                                           const RigidTransform& frame_from_cloud = {});
 
 /// The depth (Z, metres) of a dense cloud in a camera's own picture with its lens distortion: "32FC1", NaN without a
 /// measurement.

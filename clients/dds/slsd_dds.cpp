@@ -72,19 +72,21 @@ void add_scanner_options(CLI::App& app, slsd::dds::BridgeOptions& options) {
 
 void add_robot_options(CLI::App& app, slsd::dds::RobotFrames& robot, bool& prints_pose) {
   app.add_option("--robot-base", robot.base, "the frame of clouds in the robot's base (base_link)")->type_name("FRAME");
-  auto* flange = app.add_option("--flange", robot.flange, "the frame of the robot's flange in tf, such as tool0")
-                     ->type_name("FRAME");
+  auto* flange =
+      app.add_option(
+             "--flange", robot.flange,
+             "the frame in tf of the flange that carries the scanner, such as tool0: puts clouds into --robot-base")
+          ->type_name("FRAME");
   auto* prints =
       app.add_flag("--print-pose", prints_pose,
                    "print the pose of --flange in --robot-base for slsctl --poses ros, once it stands still, and exit")
           ->needs(flange);
-  flange->needs(prints);
 }
 
 void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& merge) {
   auto* merging = app.add_flag("--merge", merges, "publish one cloud of several scanners, placed by --extrinsics");
   for (const char* alone : {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate", "--no-transforms",
-                            "--describe", "--print-pose"})
+                            "--describe", "--print-pose", "--flange"})
     merging->excludes(app.get_option(alone));
   app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; may be repeated (all in the file)")
       ->needs(merging);
@@ -143,6 +145,7 @@ int main(int argc, char** argv) {
   auto joined = join(network, slsd::dds::receive_buffer_warning());
   if (!joined) return failed(joined.error());
   options.robot_base = robot.base;
+  options.flange = robot.flange;
   slsd::Result<std::unique_ptr<slsd::dds::Bridge>> bridge;
   slsd::Result<std::unique_ptr<slsd::dds::Merge>> merged;
   if (merges) {

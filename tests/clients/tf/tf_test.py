@@ -15,8 +15,10 @@ sys.path[:0] = [str(HERE.parent), str(HERE.parents[1] / "daemon"), str(HERE.pare
 import numpy as np  # noqa: E402
 
 import robot_frame_test  # noqa: E402
-from dds_test import DOMAIN, LOOPBACK, turn  # noqa: E402
-from service import BIN, SCENE, Service, slsctl  # noqa: E402
+import patience  # noqa: E402, F401
+import slsd  # noqa: E402
+from dds_test import DOMAIN, LOOPBACK, RECORD, Bridge, Listener, States, probe, turn  # noqa: E402
+from service import BIN, SCENE, Service, slsctl, wait_until  # noqa: E402
 
 IDENTITY = (0, 0, 0, 1)
 BASE = ("tf_static", "world", "base_link", (1.5, -0.3, 0.1), (0.0, 0.0, 0.6, 0.8))
@@ -43,7 +45,7 @@ class Robot:
 
     def __init__(self, fixed, moving):
         self.process = subprocess.Popen([BIN / "dds_probe", "--domain", str(DOMAIN), "--transforms"], stdin=subprocess.PIPE, text=True)
-        self.moving, self.ended = moving, threading.Event()
+        self.moving, self.ended, self.sent = moving, threading.Event(), []
         self.send(fixed, time.time())
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
@@ -59,7 +61,20 @@ class Robot:
     def run(self):
         while not self.ended.wait(0.02):
             now = time.time()
-            self.send(self.moving(now), now)
+            transforms = self.moving(now)
+            self.sent += [(round(1e9 * now), transforms[0])] if transforms else []
+            self.send(transforms, now)
+
+    def pose_at(self, stamp_ns):
+        """That of the first transform: linear between its neighbours, and along the great circle."""
+        after = next(i for i, (at, _) in enumerate(self.sent) if at >= stamp_ns)
+        (begin, first), (end, last) = self.sent[after - 1], self.sent[after]
+        share = (stamp_ns - begin) / (end - begin)
+        a, b = np.array(first[4]), np.array(last[4])
+        b = b if a @ b > 0 else -b
+        angle = np.arccos(min(1, a @ b))
+        both = ((np.sin((1 - share) * angle) * a + np.sin(share * angle) * b) / np.sin(angle) if angle > 1e-9 else a)
+        return matrix((*first[:3], (1 - share) * np.array(first[3]) + share * np.array(last[3]), both / np.linalg.norm(both)))
 
     def __enter__(self):
         return self
@@ -81,6 +96,22 @@ def printed(*options, **more):
     return out, said
 
 
+def service_of(mounted, hand_eye=True):
+    """A service with the scanner on the arm or in the cell."""
+    frame = 'output = "robot_base"\nhand_eye = "hand_eye.yml"' if hand_eye else ""
+    service = Service(configuration=robot_frame_test.CONFIGURATION.format(scene=SCENE, frame=frame))
+    (service.folder / "hand_eye.yml").write_text(robot_frame_test.hand_eye(mounted), encoding="utf-8")
+    return service
+
+
+def trigger():
+    """What a call of the trigger service answers: whether it scanned, and a message."""
+    done = subprocess.run([BIN / "dds_probe", "--domain", str(DOMAIN), "--call", "left"], capture_output=True, text=True, timeout=120,
+                          check=True)
+    _, _, scanned, message = done.stdout.strip().split(" ", 3)
+    return scanned == "1", message
+
+
 class PrintPose(unittest.TestCase):
     def test_of_a_standing_flange_is_what_the_service_takes(self):
         expected = np.linalg.inv(matrix(BASE)) @ matrix(arm()) @ matrix(TOOL)
@@ -90,11 +121,8 @@ class PrintPose(unittest.TestCase):
         numbers = [float(each) for each in out.split(",")]
         np.testing.assert_allclose(numbers[:3], expected[:3, 3] / 1000, atol=1e-7)
         np.testing.assert_allclose(turn(numbers[3:]), expected[:3, :3], atol=1e-7)
-        service = Service(configuration=robot_frame_test.CONFIGURATION.format(
-            scene=SCENE, frame='output = "robot_base"\nhand_eye = "hand_eye.yml"'))
-        (service.folder / "hand_eye.yml").write_text(robot_frame_test.hand_eye("arm"), encoding="utf-8")
-        cloud = service.folder / "part.ply"
-        with service:
+        with service_of("arm") as service:
+            cloud = service.folder / "part.ply"
             done = slsctl("scan", cloud, "--poses", "ros", f"--robot-pose={out.strip()}", "--socket", service.socket)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
         (line,) = [line for line in cloud.read_bytes().split(b"end_header")[0].decode().split("\n") if "base_from_rig" in line]
@@ -139,6 +167,83 @@ class PrintPose(unittest.TestCase):
         out, said = printed(flange="base_link")
         self.assertEqual(out, "")
         self.assertIn("must name two frames", said)
+
+
+def swinging(now):
+    """Half a metre a second, and a radian."""
+    phase = 5 * (now % 1000)
+    about = 0.2 * np.sin(phase)
+    # The sign of a quaternion means nothing: robots change it as they like.
+    sign = 1 if int(10 * phase) % 2 else -1
+    return [arm(place=(0.4 + 0.1 * np.sin(phase), -0.2, 0.6 + 0.1 * np.cos(phase)),
+                rotation=sign * np.array([0.3 * np.sin(about), 0.4 * np.sin(about), np.sqrt(0.75) * np.sin(about), np.cos(about)]))]
+
+
+class Clouds(unittest.TestCase):
+    def test_are_placed_by_the_pose_at_their_exposure(self):
+        with service_of("arm") as service, Robot([BASE, TOOL], swinging) as robot, \
+                Bridge(service, "--flange", "tool0", "--rate", "5"), slsd.Scanner(service.socket) as scanner:
+            samples = probe("left/points", "PointCloud2", "--count", "5", "--seconds", "60")
+            rig = scanner.scan(coordinate_frame="rig").points
+        self.assertEqual(len(samples), 5)
+        places = np.stack([rig[axis].astype(float) for axis in "xyz"], axis=1)
+        for sample in samples:
+            cloud = sample.point_cloud()
+            self.assertEqual(cloud["header"]["frame_id"], "base_link")
+            points = np.frombuffer(cloud["data"], RECORD)
+            np.testing.assert_array_equal(points["sigma"], rig["sigma_mm"] / np.float32(1000))
+            got = np.stack([points[axis] for axis in "xyz"], axis=1)
+            stamp_ns = round(1e9 * cloud["header"]["stamp"])
+            off = lambda at_ns: np.abs(got - self.expected(robot, at_ns, places)).max()  # noqa: E731
+            self.assertLess(off(stamp_ns), 2e-5)  # stamps in this test lose a few hundred ns
+            self.assertGreater(off(stamp_ns - 30_000_000), 2e-4)
+
+    def expected(self, robot, stamp_ns, places):
+        whole = np.linalg.inv(matrix(BASE)) @ robot.pose_at(stamp_ns) @ matrix(TOOL) @ robot_frame_test.MOUNT
+        return (places @ whole[:3, :3].T + whole[:3, 3]) / 1000
+
+    def test_are_not_published_without_a_pose_and_are_once_it_is_there(self):
+        with service_of("arm") as service, Bridge(service, "--flange", "tool0", "--rate", "5") as bridge, States() as states, \
+                Listener("left/points", "PointCloud2") as clouds:
+            def problem():
+                return states.samples.get("left: slsd", {"message": ""})["message"]
+
+            wait_until(lambda: problem() == 'the last cloud is not published: tf_missing: tf has no frame "base_link"', "what is missing")
+            self.assertEqual(trigger(), (False, 'tf_missing: tf has no frame "base_link"'))
+            with Robot([BASE, TOOL], lambda _: [(*arm()[:5], -2.0)]):
+                wait_until(lambda: "tf_late: the newest transform of \"wrist\"" in problem(), "that poses are late")
+                self.assertFalse(trigger()[0])
+            self.assertEqual(clouds.count, 0)
+            with Robot([BASE, TOOL], lambda _: [arm()]):
+                wait_until(lambda: clouds.count > 0, "a cloud")
+                wait_until(lambda: problem() == "ready to scan", "that all is well")
+                scanned, message = trigger()
+                self.assertTrue(scanned, message)
+                self.assertRegex(message, r"^\d+ points, scan ")
+            self.assertEqual(bridge.said().count("the last cloud is not published: tf_missing"), 1)
+
+    def test_are_not_published_if_two_place_the_flange(self):
+        with service_of("arm") as service, Robot([BASE, TOOL], swinging), Robot([], swinging), \
+                Bridge(service, "--flange", "tool0", "--rate", "0"):
+            wait_until(lambda: "tf_two_parents" in trigger()[1], "that both are known")
+            scanned, message = trigger()
+        self.assertFalse(scanned)
+        self.assertIn('tf_two_parents: "wrist" is placed twice', message)
+
+    def test_of_a_scanner_without_a_hand_eye_calibration_are_not_published(self):
+        with service_of("arm", hand_eye=False) as service, Robot([BASE, TOOL], swinging), \
+                Bridge(service, "--flange", "tool0", "--rate", "0"):
+            scanned, message = trigger()
+        self.assertFalse(scanned)
+        self.assertIn("hand_eye_missing", message)
+
+    def test_of_a_scanner_in_the_cell_need_no_pose(self):
+        with service_of("cell") as service, Bridge(service, "--flange", "tool0", "--rate", "5"), \
+                slsd.Scanner(service.socket) as scanner:
+            cloud = probe("left/points", "PointCloud2")[0].point_cloud()
+            expected = scanner.scan().points
+        self.assertEqual(cloud["header"]["frame_id"], "base_link")
+        np.testing.assert_array_equal(np.frombuffer(cloud["data"], RECORD)["x"], expected["x"] / np.float32(1000))
 
 
 if __name__ == "__main__":
