@@ -56,7 +56,11 @@ struct PixelPlane {
 class SurfaceLookup {
  public:
   SurfaceLookup(const SurfaceView& view, const RigidTransform& object_from_rig)
-      : image_(view.image), planes_(view.image.depth_mm.size()) {
+      : image_(view.image),
+        tile_columns_((view.image.width + kTilePx - 1) / kTilePx),
+        tile_rows_((view.image.height + kTilePx - 1) / kTilePx),
+        planes_(view.image.depth_mm.size()),
+        farthest_of_tile_(static_cast<std::size_t>(tile_columns_) * tile_rows_) {
     const RigidTransform camera_from_object = view.image.camera_from_rig.after(object_from_rig.inverse());
     rotation_ = camera_from_object.rotation.cast<float>(), translation_ = camera_from_object.translation.cast<float>();
     const Eigen::Matrix3f camera_rotation = view.image.camera_from_rig.rotation.cast<float>();
@@ -73,6 +77,9 @@ class SurfaceLookup {
         const Eigen::Vector3f normal = camera_rotation * cell->normal;
         const float cosine = -normal.dot(unit) / unit.norm();
         planes_[pixel] = {unit * image_.depth_mm[pixel], normal, image_.sigma_mm[pixel] * std::max(cosine, 0.1F)};
+        float& farthest = farthest_of_tile_[static_cast<std::size_t>(y / kTilePx) * tile_columns_ +
+                                            static_cast<std::size_t>(x / kTilePx)];
+        farthest = std::max(farthest, image_.depth_mm[pixel]);
       }
     }
   }
@@ -93,6 +100,20 @@ class SurfaceLookup {
   }
   [[nodiscard]] std::uint8_t intensity_of(const PixelPlane& plane) const {
     return image_.intensity[static_cast<std::size_t>(&plane - planes_.data())];
+  }
+  /// Greatest depth of the surface in a square of pixels, mm; 0 if nothing is measured there. It may reach over the
+  /// square by a tile.
+  [[nodiscard]] float farthest_mm(const Eigen::Vector2f& middle_px, float radius_px) const {
+    const auto tile = [](float px, int tiles) {
+      return std::clamp(static_cast<int>(std::floor(px / kTilePx)), 0, tiles - 1);
+    };
+    float farthest = 0;
+    for (int row = tile(middle_px.y() - radius_px, tile_rows_); row <= tile(middle_px.y() + radius_px, tile_rows_);
+         ++row)
+      for (int column = tile(middle_px.x() - radius_px, tile_columns_);
+           column <= tile(middle_px.x() + radius_px, tile_columns_); ++column)
+        farthest = std::max(farthest, farthest_of_tile_[static_cast<std::size_t>(row) * tile_columns_ + column]);
+    return farthest;
   }
   /// Calls visit(place in the object's frame) along the ray of every second measured pixel, within the band.
   template <class Visit>
@@ -127,11 +148,18 @@ class SurfaceLookup {
     return nearest;
   }
 
+  static constexpr int kTilePx = 8;
+
   const RangeImage& image_;
   Eigen::Matrix3f rotation_;
   Eigen::Vector3f translation_;
+  int tile_columns_, tile_rows_;
   std::vector<PixelPlane> planes_;
+  std::vector<float> farthest_of_tile_;  // depth, mm
 };
+
+/// A voxel so many bands behind the surface, along the camera's axis, is hidden.
+constexpr float kHiddenBands = 3;
 
 struct Leaves {
   FloatLeaf* distance;
@@ -146,9 +174,9 @@ void add_to_voxel(const Leaves& leaves, openvdb::Index at, const SurfaceLookup& 
   if (!plane) return;
   const float before_mm = plane->place.z() - place.z();  // along the camera's axis
   const float off_mm = plane->normal.dot(place - plane->place);
-  if (off_mm < -band_mm || before_mm < -3 * band_mm) return;  // hidden
+  if (off_mm < -band_mm || before_mm < -kHiddenBands * band_mm) return;  // hidden
   VoxelFacts facts = VoxelFacts::of(leaves.facts->getValue(at));
-  if (off_mm > band_mm || before_mm > 3 * band_mm) {
+  if (off_mm > band_mm || before_mm > kHiddenBands * band_mm) {
     facts.passed += facts.passed < VoxelFacts::kMost ? 1 : 0;
   } else {
     // Deep below the surface, another side of the object may be nearer.
@@ -182,6 +210,9 @@ void add_to_leaf(const Leaves& leaves, const SurfaceLookup& surface, const Volum
   if (pixel.x() < -radius || pixel.y() < -radius || pixel.x() > static_cast<float>(surface.image().width) + radius ||
       pixel.y() > static_cast<float>(surface.image().height) + radius)
     return;
+  // Half of the object lies behind what the camera sees. A lens may widen the square.
+  const float nearest_mm = middle.z() - kLeafSide * options.voxel_mm;
+  if (surface.farthest_mm(pixel, 1.5F * radius + 1) < nearest_mm - kHiddenBands * options.band_mm) return;
   for (int i = 0; i < kLeafSide; ++i)
     for (int j = 0; j < kLeafSide; ++j)
       for (int k = 0; k < kLeafSide; ++k)

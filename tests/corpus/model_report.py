@@ -82,10 +82,20 @@ class Turning:
 
 
 def processor_s(process):
-    """Waits for a process. @return its status, processor time and peak memory in MiB"""
-    _, status, usage = os.wait4(process.pid, 0)
+    """Waits for a process. @return its status, processor time and peak memory in MiB
+
+    The kernel's ru_maxrss would be that of this program, which is larger, as the process began as a copy of it.
+    """
+    peak_kib = 0
+    while True:
+        about = pathlib.Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+        peak_kib = max([peak_kib, *map(int, re.findall(r"^VmHWM:\s+(\d+) kB", about, re.M))])
+        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
+        if ended:
+            break
+        time.sleep(0.02)
     process.returncode = os.waitstatus_to_exitcode(status)
-    return process.returncode, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    return process.returncode, usage.ru_utime + usage.ru_stime, peak_kib / 1024
 
 
 def record(turning, folder, programs):
