@@ -79,7 +79,7 @@ void add_robot_options(CLI::App& app, slsd::dds::RobotFrames& robot, bool& print
           ->type_name("FRAME");
   auto* prints =
       app.add_flag("--print-pose", prints_pose,
-                   "print the pose of --flange in --robot-base for slsctl --poses ros, once it stands still, and exit")
+                   "print the pose of --flange in --robot-base as ROS has it, once it stands still, and exit")
           ->needs(flange);
 }
 
