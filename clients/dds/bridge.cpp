@@ -197,7 +197,7 @@ class Running : public Bridge {
       return fail(
           ErrorCode::kNotFound,
           "hand_eye_missing: the service has no hand-eye calibration for the scanner on the arm, or an old one: "
-          "run slsctl hand-eye --mounted arm, set [frame] hand_eye, and run slsctl reload");
+          "run slsctl hand-eye --mounted arm, set [frame] hand_eye, and run systemctl reload slsd");
     }
     const auto time = time_from_utc(time_of_exposure(told));
     if (!time) return fail(ErrorCode::kMalformed, "time_missing: the cloud does not say when it was exposed");

@@ -54,7 +54,8 @@ class Decoder {
   [[nodiscard]] std::uint8_t camera_index() const;  ///< index in the calibration
 
   /// Limits decoding to these pixels of the frame, with some cells around them as evidence; empty: all of them. The
-  /// symbols there get the points that they have in the whole frame. Symbols further away have no regions.
+  /// look of symbols is measured there, so that points differ from those of the whole frame by a part of their noise.
+  /// Symbols further away have no regions.
   void set_part(const std::optional<PixelRectangle>& part);
 
   /// Decodes an image to points. The result is valid until the next call. If nothing is found, the result is empty,

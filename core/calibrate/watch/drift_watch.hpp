@@ -16,8 +16,7 @@ namespace slsd {
 /// The remedy for a knocked rig, in every message about one.
 inline constexpr const char* kKnockRemedy =
     "fasten projector and camera, stop the service and run slsd --correct with a board in view; if it refuses, "
-    "calibrate "
-    "again";
+    "calibrate again";
 
 /// Evidence from scans about one camera's calibration.
 struct DriftState {
