@@ -13,7 +13,7 @@ CTEST, BUILD = sys.argv[1:3]
 
 
 def run(*arguments):
-    return subprocess.run(arguments, capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run(arguments, capture_output=True, text=True, check=False, timeout=600)
 
 
 def labels_of(test):

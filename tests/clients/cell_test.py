@@ -213,7 +213,7 @@ class Merged(Folder):
                              (["--extrinsics", self.folder / "none.toml"], "extrinsics_missing"), ([], "extrinsics_missing"),
                              (["--extrinsics", alone, "--scanner", "left", "--scanner", "right"], "no [scanner.right]")):
             done = subprocess.run([BIN / "slsd-dds", "--merge", "--domain", str(DOMAIN), "--interface", "lo", "--peer", "127.0.0.1",
-                                   *map(str, more)], capture_output=True, text=True, timeout=60, check=False)
+                                   *map(str, more)], capture_output=True, text=True, timeout=600, check=False)
             self.assertIn(done.returncode, (1, 2))
             self.assertIn(reason, done.stderr)
 

@@ -174,7 +174,7 @@ def main(number):
 
     def one(topic, kind, qos):
         reader = DataReader(participant, Topic(participant, topic, kind), qos=qos)
-        for sample in reader.take_iter(timeout=duration(seconds=30)):
+        for sample in reader.take_iter(timeout=duration(seconds=600)):
             return asdict(sample)
         raise TimeoutError(topic)
 
@@ -184,7 +184,7 @@ def main(number):
         topic = DataWriter(participant, Topic(participant, "rt/left/trigger", Empty), qos=service)
         time.sleep(2)  # until they found each other
         requests.write(TriggerRequest(0x1122334455667788, 7, 0))
-        answer = next(replies.take_iter(timeout=duration(seconds=30)))
+        answer = next(replies.take_iter(timeout=duration(seconds=600)))
         topic.write(Empty(0))
         time.sleep(1)
         return asdict(answer)

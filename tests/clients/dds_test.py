@@ -214,7 +214,7 @@ class Shown(unittest.TestCase):
         self.assertEqual([message["is_bigendian"], message["is_dense"]], [0, 1])
         self.assertEqual([tuple(field) for field in message["fields"]], FIELDS)
         self.assertEqual(message["header"]["frame_id"], "left_optical_frame")
-        self.assertLess(abs(message["header"]["stamp"] - time.time()), 30)
+        self.assertLess(abs(message["header"]["stamp"] - time.time()), 600)
         points = np.frombuffer(message["data"], RECORD)
         for ours, theirs in (("x", "x"), ("y", "y"), ("z", "z"), ("sigma", "sigma_mm")):
             np.testing.assert_array_equal(points[ours], expected[theirs] / np.float32(1000))
@@ -265,7 +265,7 @@ class Shown(unittest.TestCase):
     def test_the_robot_description_is_that_which_it_prints(self):
         (sample,) = probe("left/robot_description", "String", "--latched")
         printed = subprocess.run([BIN / "slsd-dds", "--name", "left", "--socket", self.service.socket, "--describe"],
-                                 capture_output=True, text=True, timeout=60, check=True).stdout
+                                 capture_output=True, text=True, timeout=600, check=True).stdout
         self.assertIn("left_projector_optical_frame", printed)
         self.assertEqual(sample.text(), printed)
 
@@ -412,7 +412,7 @@ class Usage(unittest.TestCase):
                             (["--stride", "0"], '"0" is not a number from 1 to 16'),
                             (["--name", "--rate"], "a value is missing before --rate"),
                             (["--scanner", "left"], "--scanner needs --merge"), (["left"], 'unexpected argument "left"')):
-            done = subprocess.run([BIN / "slsd-dds", *words], capture_output=True, text=True, timeout=60, check=False)
+            done = subprocess.run([BIN / "slsd-dds", *words], capture_output=True, text=True, timeout=600, check=False)
             self.assertEqual((done.returncode, done.stdout), (2, ""))
             self.assertIn(hint, done.stderr)
 
@@ -483,7 +483,7 @@ class Discovery(unittest.TestCase):
 
     def test_of_peers_that_are_no_hosts_is_refused(self):
         done = subprocess.run([BIN / "slsd-dds"], env={**os.environ, "ROS_STATIC_PEERS": "no.such.host.invalid"},
-                              capture_output=True, text=True, timeout=60, check=False)
+                              capture_output=True, text=True, timeout=600, check=False)
         self.assertEqual(done.returncode, 2)
         self.assertIn("no.such.host.invalid", done.stderr)
 
@@ -516,7 +516,7 @@ class Strangers(unittest.TestCase):
 
     def test_that_are_no_addresses_are_refused(self):
         for word in ("--interface", "--peer"):
-            done = subprocess.run([BIN / "slsd-dds", word, "<no>"], capture_output=True, text=True, timeout=30, check=False)
+            done = subprocess.run([BIN / "slsd-dds", word, "<no>"], capture_output=True, text=True, timeout=600, check=False)
             self.assertEqual(done.returncode, 2)
             self.assertIn("a name or an address", done.stderr)
 

@@ -94,7 +94,7 @@ class Examples(unittest.TestCase):
         folder.mkdir()
         (folder / "gpiod.py").write_text(GPIOD, encoding="utf-8")
         done = subprocess.run([sys.executable, PACKAGE / "examples/conveyor.py", folder, "/dev/gpiochip0", "17"], capture_output=True,
-                              text=True, timeout=60, check=False, env={**environment(self.service), "PYTHONPATH": f"{PACKAGE}:{folder}"})
+                              text=True, timeout=600, check=False, env={**environment(self.service), "PYTHONPATH": f"{PACKAGE}:{folder}"})
         self.assertIn("KeyboardInterrupt", done.stderr)
         self.assertEqual([line.split(":")[0] for line in done.stdout.splitlines()], ["part 0", "part 1", "part 2"])
         self.assertEqual(len(list(folder.glob("part-*.npy"))), 3)
@@ -145,7 +145,7 @@ class Usage(unittest.TestCase):
              "to_open3d.py": [[], ["a.ply", "b"]], "print_part.py": [[], ["a.stl"], ["a.stl", "1"], ["a.stl", "x"], ["a.stl", "3", "--box", "1"]]}
 
     def said(self, name, words):
-        done = subprocess.run([sys.executable, PACKAGE / "examples" / name, *words], input="", text=True, capture_output=True, timeout=60, check=False,
+        done = subprocess.run([sys.executable, PACKAGE / "examples" / name, *words], input="", text=True, capture_output=True, timeout=600, check=False,
                               env={**os.environ, "SLSD_SOCKET": "/nonexistent/slsd.sock", "PYTHONPATH": str(PACKAGE), "MPLBACKEND": "agg"})
         return done.returncode, done.stdout, done.stderr
 
@@ -201,7 +201,7 @@ class Pick(unittest.TestCase):
     def test_says_that_nothing_holds(self):
         with recorded(CELL / "left") as service:
             done = subprocess.run([sys.executable, PACKAGE / "examples/pick.py", "700"], env=environment(service), text=True,
-                                  capture_output=True, timeout=60, check=False)
+                                  capture_output=True, timeout=600, check=False)
         self.assertEqual(done.returncode, 1)
         self.assertIn("no place for this cup", done.stderr)
 

@@ -62,7 +62,7 @@ def rotation(axis, angle):
 
 
 def describe(*arguments):
-    return subprocess.run([BIN / "slsd-dds", "--describe", *map(str, arguments)], capture_output=True, text=True, timeout=60,
+    return subprocess.run([BIN / "slsd-dds", "--describe", *map(str, arguments)], capture_output=True, text=True, timeout=600,
                           check=True).stdout
 
 
@@ -136,7 +136,7 @@ class Description(unittest.TestCase):
             for arguments, word in ((["--socket", service.socket], "slsctl calibrate"), (["--socket", "/nowhere"], "start slsd"),
                                     (["/nowhere.yml"], "/nowhere.yml"), (["--name", "left-1"], "letters, digits and _")):
                 done = subprocess.run([BIN / "slsd-dds", "--describe", *map(str, arguments)], capture_output=True, text=True,
-                                      timeout=60, check=False)
+                                      timeout=600, check=False)
                 self.assertEqual((done.returncode in (1, 2), done.stdout), (True, ""))
                 self.assertIn(word, done.stderr)
 
@@ -194,7 +194,7 @@ class Package(unittest.TestCase):
 
 def has_interpreter():
     try:
-        return subprocess.run([PYTHON, HERE / "launch_file.py", PACKAGE / LAUNCH], capture_output=True, timeout=60,
+        return subprocess.run([PYTHON, HERE / "launch_file.py", PACKAGE / LAUNCH], capture_output=True, timeout=600,
                               check=False).returncode == 0
     except OSError:
         return False
@@ -203,7 +203,7 @@ def has_interpreter():
 def read(*arguments, path=BIN, **environment):
     """What the launch file starts."""
     done = subprocess.run([PYTHON, HERE / "launch_file.py", PACKAGE / LAUNCH, *map(str, arguments)], capture_output=True, text=True,
-                          timeout=60, check=True, env={"PATH": f"{path}:/usr/bin:/bin", **environment})
+                          timeout=600, check=True, env={"PATH": f"{path}:/usr/bin:/bin", **environment})
     return json.loads(done.stdout)
 
 
@@ -270,7 +270,7 @@ class LaunchFile(Seen):
         self.assertEqual(command, ["--name", "left", "--socket", "/nowhere/s", "--rate", "5", "--density", "pixels", "--stride", "4",
                                    "--voxel", "2.5", "--image-rate", "0", "--extrinsics", "cell of two.toml", "--no-transforms"])
         done = subprocess.run([BIN / "slsd-dds", *command, "--describe", HERE / "cell/left/calibration.yml"], capture_output=True,
-                              timeout=60, check=False)
+                              timeout=600, check=False)
         self.assertEqual(done.returncode, 0)
 
     def test_refuses_what_it_does_not_know(self):
@@ -319,7 +319,7 @@ class LaunchFile(Seen):
 
 def has_ros2():
     try:
-        return subprocess.run(["ros2", "launch", "--help"], capture_output=True, timeout=60, check=False).returncode == 0
+        return subprocess.run(["ros2", "launch", "--help"], capture_output=True, timeout=600, check=False).returncode == 0
     except OSError:
         return False
 

@@ -23,7 +23,7 @@ class PathProxy:
                     self.send_error(404)
                     return
                 body = self.rfile.read(int(self.headers.get("Content-Length", 0)))
-                connection = http.client.HTTPConnection("127.0.0.1", ports[name], timeout=60)
+                connection = http.client.HTTPConnection("127.0.0.1", ports[name], timeout=600)
                 connection.putrequest(self.command, "/" + rest, skip_host=True, skip_accept_encoding=True)
                 for header, value in self.headers.items():
                     if header.lower() not in HOPS:

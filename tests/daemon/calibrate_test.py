@@ -104,7 +104,7 @@ class Calibrate(unittest.TestCase):
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
                 self.assertIn("pictures in", running.stdout.readline())
                 running.send_signal(signal.SIGINT)  # ends it with the poses that are there
-                out, said = running.communicate(timeout=60)
+                out, said = running.communicate(timeout=600)
                 self.assertEqual(running.returncode, 1, out)
                 self.assertIn("at least 3 are needed", said)
 
@@ -129,7 +129,7 @@ class Calibrate(unittest.TestCase):
             client.call("calibrate", action="begin", board=BOARD)
             begin = time.monotonic()
             self.assertEqual(service.stop()[0], 0)  # while one is under way
-            self.assertLess(time.monotonic() - begin, 10)
+            self.assertLess(time.monotonic() - begin, 60)
             self.assertEqual([each.name for each in self.state.glob("*.yml")], [])
 
     def test_wrong_parameters_begin_nothing(self):

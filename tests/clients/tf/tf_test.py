@@ -165,7 +165,7 @@ class PrintPose(unittest.TestCase):
                 self.assertIn(message, said)
 
     def test_needs_a_flange(self):
-        done = subprocess.run([BIN / "slsd-dds", "--print-pose"], capture_output=True, text=True, timeout=60, check=False)
+        done = subprocess.run([BIN / "slsd-dds", "--print-pose"], capture_output=True, text=True, timeout=600, check=False)
         self.assertEqual((done.returncode, done.stdout), (2, ""))
         self.assertIn("--print-pose needs --flange", done.stderr)
         out, said = printed(flange="base_link")
