@@ -55,7 +55,7 @@ class Documents(unittest.TestCase):
         block = block_with("scanner.toml")
         text = block.text.replace("./run build\n", "")
         text = text.replace("/tmp/slsd.sock", str(self.socket))  # two runs of this test do not meet
-        text = text.replace("[server]", "[scan]\ntimeout_ms = 60000\n[server]")  # the machine may be busy
+        text = text.replace("[server]", "[scan]\ntimeout_ms = 600000\n[server]")  # the machine may be busy
         text = "trap 'kill $(jobs -p) || true' EXIT\n" + text  # if a command fails, the service ends, too
         program = block_with("socket.AF_UNIX").text
         (self.folder / "program.py").write_text(program, encoding="utf-8")
@@ -72,7 +72,7 @@ class Documents(unittest.TestCase):
         scanner = SOURCE / "tests/clients/recorded/gap/slsd.toml"
         configuration = scanner.read_text(encoding="utf-8").replace("/tmp/slsd-example.sock", str(self.socket))
         configuration = re.sub(r'(file|path) = "', rf'\1 = "{scanner.parent}/', configuration)
-        (self.folder / "slsd.toml").write_text(configuration + "[scan]\ntimeout_ms = 60000\n", encoding="utf-8")
+        (self.folder / "slsd.toml").write_text(configuration + "[scan]\ntimeout_ms = 600000\n", encoding="utf-8")
         text = "\n".join(["PATH=$PWD/build/release/bin:$PATH", "slsd --config slsd.toml &",
                           "until slsctl status >/dev/null 2>&1; do sleep 0.1; done", *commands, "kill %1"])
         self.run_here("bash", "-e", text=text)

@@ -74,7 +74,7 @@ class Mesh(unittest.TestCase):
         self.folder = pathlib.Path(temporary.name)
 
     def scan(self, name, *arguments):
-        done = slsctl("--socket", self.service.socket, "scan", self.folder / name, "--timeout-ms", "60000", *arguments)
+        done = slsctl("--socket", self.service.socket, "scan", self.folder / name, "--timeout-ms", "600000", *arguments)
         self.assertEqual(done.returncode, 0, done.stderr)
         return self.folder / name
 
@@ -123,7 +123,7 @@ class Mesh(unittest.TestCase):
     def test_a_mesh_goes_to_standard_output_and_beside_a_picture(self):
         picture = self.folder / "p.png"
         done = subprocess.run((BIN / "slsctl", "--socket", self.service.socket, "scan", "-", "--format", "stl", "--cloud-picture",
-                               picture, "--timeout-ms", "60000"), capture_output=True, timeout=120, check=False)
+                               picture, "--timeout-ms", "600000"), capture_output=True, timeout=120, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(len(done.stdout), 84 + 50 * int.from_bytes(done.stdout[80:84], "little"))
         self.assertTrue(picture.read_bytes().startswith(b"\x89PNG"))
@@ -141,7 +141,7 @@ class Mesh(unittest.TestCase):
 
     def test_a_scene_without_a_surface_gives_no_file(self):
         with Service(camera_path=SCENE / "dim.png") as service:
-            done = slsctl("--socket", service.socket, "scan", self.folder / "a.stl", "--timeout-ms", "60000")
+            done = slsctl("--socket", service.socket, "scan", self.folder / "a.stl", "--timeout-ms", "600000")
         self.assertEqual(done.returncode, 1)
         self.assertIn("there is no surface to write", done.stderr)
         self.assertIn("--why", done.stderr)

@@ -240,7 +240,7 @@ class Adversity(unittest.TestCase):
                 self.assertEqual(len(vertices(ply)), browser.run("return view.ply.count;"))
                 # A frame that is played back gives the same points: what the service itself writes is the same but for names.
                 for kind, saved in (("ply", ply), ("pcd", pcd)):
-                    _, own = client.call("scan", format=kind, density=density, timeout_ms=60000)
+                    _, own = client.call("scan", format=kind, density=density, timeout_ms=600000)
                     (told, points), (own_told, own_points) = self.read(kind, saved), self.read(kind, own)
                     self.assertEqual(told, own_told)
                     self.assertEqual(points.dtype.names, own_points.dtype.names)

@@ -26,7 +26,7 @@ path = "{BUST}/frame.png"
 [calibration]
 file = "{BUST}/calibration.yml"
 [scan]
-timeout_ms = 60000
+timeout_ms = 600000
 [server]
 socket = "slsd.sock"
 """
@@ -117,7 +117,7 @@ class Space(unittest.TestCase):
         with self.service.client() as client:
             self.open()
             self.scan("pixels")
-            points = points_of(client.call("scan", format="pcd", density="pixels", normals=True, timeout_ms=60000)[1])
+            points = points_of(client.call("scan", format="pcd", density="pixels", normals=True, timeout_ms=600000)[1])
             count = self.browser.run("return view.ply.count;")
             self.assertEqual(len(points), count)
             normals = np.stack([points[f"normal_{axis}"] for axis in "xyz"], 1)
@@ -238,7 +238,7 @@ class Space(unittest.TestCase):
             self.browser.click("#box-draw")
             self.browser.wait("/Scan first/.test(document.getElementById('message').textContent)", "no word that a scan is needed")
             self.scan("pixels")
-            whole = points_of(client.call("scan", format="pcd", density="pixels", timeout_ms=60000)[1])
+            whole = points_of(client.call("scan", format="pcd", density="pixels", timeout_ms=600000)[1])
             self.browser.click("#box-draw")
             self.browser.wait("drawsBox && map.records", "no map to draw on")
             self.drag("#map", (200, 120), (300, 220))  # the bust's face
@@ -292,7 +292,7 @@ class Space(unittest.TestCase):
 
     def test_a_plane_in_the_robots_base_keeps_its_frame(self):
         with self.service.client() as client:
-            whole = points_of(client.call("scan", format="pcd", density="pixels", timeout_ms=60000)[1])
+            whole = points_of(client.call("scan", format="pcd", density="pixels", timeout_ms=600000)[1])
         middle = float(np.median(whole["z"]))
         service = self.in_base(f"plane = [0, 0, 1, {5000 + middle}]")  # in the rig's frame it would leave nothing
         self.browser.wait("planeIsInBase()", "no word of the plane")
@@ -331,7 +331,7 @@ class Space(unittest.TestCase):
         self.browser.wait("boxChosen === null", "it is not set")
         with service.client() as client:
             self.assertEqual(client.call("settings")[0]["set"]["cloud"], {"box": [-1000, -1000, 100, 1000, 1000, 2100], "box_frame": "rig"})
-            self.assertEqual(client.call("scan", density="pixels", timeout_ms=60000)[0]["points"], count)
+            self.assertEqual(client.call("scan", density="pixels", timeout_ms=600000)[0]["points"], count)
         self.assertEqual(self.note(), "Every scan measures this box alone.")
         self.assertEqual(self.browser.complaints(), [])
 

@@ -173,7 +173,7 @@ class Vanishing(unittest.TestCase):
 
     def test_stopping_while_a_client_waits_ends_in_time_and_is_overcome(self):
         with Service() as service, slsd.Scanner(service.socket) as scanner:
-            stream = scanner.stream(idle_s=1)
+            stream = scanner.stream(idle_s=10)
             next(stream)
             service.send_signal(signal.SIGSTOP)
             try:

@@ -190,7 +190,7 @@ class Box(unittest.TestCase):
     def test_on_the_command_line(self):
         with tempfile.TemporaryDirectory(prefix="slsd-test-") as folder:
             cloud = pathlib.Path(folder) / "cloud.ply"
-            words = ["--socket", str(self.service.socket), "scan", str(cloud), "--density", "pixels", "--timeout-ms", "60000"]
+            words = ["--socket", str(self.service.socket), "scan", str(cloud), "--density", "pixels", "--timeout-ms", "600000"]
             done = slsctl(*words, "--box", ",".join(map(str, BOX)))
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assert_same_points(ply(cloud.read_bytes())[1], of_box(self.pixels))

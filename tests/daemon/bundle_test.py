@@ -84,8 +84,8 @@ class Bundle(unittest.TestCase):
         with service_on(["16px-5-bust", "16px-5-plane_0"]) as service:
             service.wait_ready()
             with service.client() as client:
-                clouds = [client.call("scan", timeout_ms=60000)[1] for _ in range(2)]
-                dense = client.call("scan", timeout_ms=60000, density="pixels")[1]
+                clouds = [client.call("scan", timeout_ms=600000)[1] for _ in range(2)]
+                dense = client.call("scan", timeout_ms=600000, density="pixels")[1]
             files = self.bundle(service)
         self.assertEqual([files[f"recording-1/clouds/0000000{i}.ply"] for i in range(2)], clouds)
         told = [json.loads(line) for line in files["recording-1/scans.jsonl"].splitlines()]
@@ -108,7 +108,7 @@ class Bundle(unittest.TestCase):
         again = Service(configuration=files["recording-1/slsd.toml"].decode())
         shutil.copytree(self.folder / "unpacked" / "recording-1", again.folder, dirs_exist_ok=True)
         with again, again.client() as client:
-            cloud = client.call("scan", timeout_ms=60000)[1]
+            cloud = client.call("scan", timeout_ms=600000)[1]
         self.assertEqual(cloud.split(b"end_header\n", 1)[1], clouds[0].split(b"end_header\n", 1)[1])
 
     def test_holds_what_the_service_says_of_itself(self):
@@ -126,11 +126,11 @@ class Bundle(unittest.TestCase):
 
     def test_a_reload_begins_another_recording(self):
         with service_on(["16px-5-bust"]) as service, service.client() as client:
-            client.call("scan", timeout_ms=60000)
+            client.call("scan", timeout_ms=600000)
             text = service.file.read_text(encoding="utf-8")
             service.file.write_text(text.replace("1500.0", "1600.0"), encoding="utf-8")
             client.call("reload")
-            client.call("scan", timeout_ms=60000)
+            client.call("scan", timeout_ms=600000)
             files = self.bundle(service)
         self.assertIn(b"1500.0", files["recording-1/slsd.toml"])
         self.assertIn(b"1600.0", files["recording-2/slsd.toml"])
@@ -139,7 +139,7 @@ class Bundle(unittest.TestCase):
     def test_keeps_the_newest_within_its_memory(self):
         """A frame is 1.92 MB."""
         with service_on(["16px-5-bust"], black_box="memory_max_mb = 4") as service, service.client() as client:
-            names = [client.call("scan", timeout_ms=60000)[0]["scan"] for _ in range(4)]
+            names = [client.call("scan", timeout_ms=600000)[0]["scan"] for _ in range(4)]
             held = client.call("status")[0]["black_box"]
             files = self.bundle(service)
             lines = [json.loads(line) for line in files["recording-1/scans.jsonl"].splitlines()]
@@ -162,7 +162,7 @@ class Bundle(unittest.TestCase):
         with service_on(["16px-5-bust"], environment={"STATE_DIRECTORY": str(state)}) as service:
             service.wait_ready()
             with service.client() as client:
-                client.call("scan", timeout_ms=60000)
+                client.call("scan", timeout_ms=600000)
                 (service.folder / "frames" / "0.png").write_bytes(b"P5 640 480 255\n" + bytes(640 * 480))
                 for _ in range(3):
                     with self.assertRaises(RpcError):

@@ -211,9 +211,9 @@ class Dense(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="slsd-test-") as folder:
             out = pathlib.Path(folder)
             for name in ("a.ply", "a.pcd", "a.tiff", "a.tif"):
-                done = slsctl("--socket", str(self.service.socket), "scan", str(out / name), "--density", "pixels", "--timeout-ms", "60000")
+                done = slsctl("--socket", str(self.service.socket), "scan", str(out / name), "--density", "pixels", "--timeout-ms", "600000")
                 self.assertEqual(done.returncode, 0, done.stderr)
-            drawn = slsctl("--socket", str(self.service.socket), "scan", str(out / "b.ply"), "--density", "pixels", "--timeout-ms", "60000",
+            drawn = slsctl("--socket", str(self.service.socket), "scan", str(out / "b.ply"), "--density", "pixels", "--timeout-ms", "600000",
                            "--normals", "--cloud-picture", str(out / "b.png"))
             self.assertEqual(drawn.returncode, 0, drawn.stderr)
             _, points = ply((out / "a.ply").read_bytes())
@@ -239,7 +239,7 @@ class DenseElsewhere(unittest.TestCase):
     def test_recording_replays_byte_for_byte(self):
         recording = self.folder() / "recording"
         with Service(camera=PIXELS) as service:
-            done = slsctl("--socket", service.socket, "record", recording, "--frames", "1", "--clouds", "--timeout-ms", "60000")
+            done = slsctl("--socket", service.socket, "record", recording, "--frames", "1", "--clouds", "--timeout-ms", "600000")
             self.assertEqual(done.returncode, 0, done.stderr)
         again = Service(configuration=(recording / "slsd.toml").read_text(encoding="utf-8"))
         shutil.copytree(recording, again.folder, dirs_exist_ok=True)

@@ -37,7 +37,7 @@ def scan(path, stop, result):
         while not stop.is_set():
             begin = time.monotonic()
             try:
-                reply, cloud = client.call("scan", timeout_ms=60000)
+                reply, cloud = client.call("scan", timeout_ms=600000)
                 if len(vertices(cloud)) != reply["points"] or reply["points"] < 1000:
                     wrong.append(f"{reply['points']} points")
                 done += 1
@@ -140,7 +140,7 @@ def main():
         else:
             with service.client() as client:
                 wait_until(lambda: client.call("status")[0]["clients"] == 1, "the hostile clients to be gone")
-                client.call("scan", timeout_ms=60000)
+                client.call("scan", timeout_ms=600000)
                 state = client.call("status")[0]
             rest = resident_kib(service.process)
             print(f"after: {state['clients']} client(s), {state['clients_dropped']} dropped, "

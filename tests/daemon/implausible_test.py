@@ -76,7 +76,7 @@ class Implausible(unittest.TestCase):
                  Service(configuration=configuration(self.folder, change)) as service, service.client() as client:
                 advice = ADVICE[change.__name__]
                 for density in ("symbols", "pixels"):
-                    scan, _ = client.call("scan", density=density, timeout_ms=60000)
+                    scan, _ = client.call("scan", density=density, timeout_ms=600000)
                     self.assertEqual(scan["points"], 0)
                     self.assertIn(advice, scan["empty"])
                 self.assertIn(advice, client.call("status")[0]["scans"]["empty"])

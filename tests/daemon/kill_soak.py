@@ -71,7 +71,7 @@ def start_again(service):
     service.wait_ready()
     ready = time.monotonic() - begin
     with service.client() as client:
-        if client.call("scan", timeout_ms=60000)[0]["points"] < 1000:
+        if client.call("scan", timeout_ms=600000)[0]["points"] < 1000:
             raise ValueError("the first scan is no good")
     left = {entry.name for entry in service.folder.iterdir()} - EXPECTED
     if left:

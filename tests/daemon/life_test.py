@@ -156,7 +156,7 @@ class Life(unittest.TestCase):
     def test_reload_takes_decode_options_and_names_what_needs_a_restart(self):
         with Service() as service, service.client() as client:
             text = service.file.read_text(encoding="utf-8")
-            changed = text.replace("timeout_ms = 60000", "timeout_ms = 4000\nprojector_latency_ms = 50.0")
+            changed = text.replace("timeout_ms = 600000", "timeout_ms = 4000\nprojector_latency_ms = 50.0")
             service.file.write_text(changed + "clients_max = 7\n[decode]\ndepth_max_mm = 600.0\n", encoding="utf-8")
             self.assertEqual(client.call("reload")[0], {"needs_restart": ["server", "scan"]})
             self.assertEqual(client.call("scan")[0]["points"], 0)
@@ -279,13 +279,13 @@ class Life(unittest.TestCase):
             client.call_for_descriptor("scan", transport="memfd")[1].close()
 
     def test_memory_that_clients_hold_is_shared(self):
-        with Service(server="memory_max_mb = 16\nsend_timeout_ms = 60000") as service:
+        with Service(server="memory_max_mb = 16\nsend_timeout_ms = 600000") as service:
             service.wait_ready()
             with service.client() as modest:
                 greedy = [service.client() for _ in range(24)]
                 told = 0
                 for client in greedy:  # each holds a frame and a half that it does not read
-                    client.request("scan", frames="raw", timeout_ms=60000)
+                    client.request("scan", frames="raw", timeout_ms=600000)
                 for client in greedy:
                     message = client.receive_line()
                     told += message.get("error", {}).get("data", {}).get("name") == "busy"
@@ -293,7 +293,7 @@ class Life(unittest.TestCase):
                 self.assertLess(told, 24)
                 memory = modest.call("status")[0]["clients_memory"]
                 self.assertLess(memory["held_bytes"], memory["limit_bytes"] * 1.05)
-                self.assertGreater(modest.call("scan", timeout_ms=60000)[0]["points"], 0)
+                self.assertGreater(modest.call("scan", timeout_ms=600000)[0]["points"], 0)
                 for client in greedy:
                     client.close()
                 wait_until(lambda: modest.call("status")[0]["clients_memory"]["held_bytes"] < 1e6, "the memory")

@@ -52,7 +52,7 @@ class View(unittest.TestCase):
             before = look(client)
             self.assertEqual(before.value("slsd_scans_succeeded_total"), 0)
             replies = [client.call("scan")[0] for _ in range(3)]
-            dense = client.call("scan", density="pixels", timeout_ms=60000)[0]
+            dense = client.call("scan", density="pixels", timeout_ms=600000)[0]
             with self.assertRaises(RpcError):
                 client.call("scan", camera="nobody")
             with self.assertRaises(RpcError):
@@ -144,7 +144,7 @@ class OlderFormat(unittest.TestCase):
     def test_has_the_same_samples_with_type_and_help(self):
         with Service() as service, service.client() as client:
             service.wait_ready()
-            client.call("scan", timeout_ms=60000)
+            client.call("scan", timeout_ms=600000)
             told, payload = client.call("metrics", format="prometheus")
             newer = look(client)
             with self.assertRaisesRegex(RpcError, "openmetrics"):

@@ -34,7 +34,7 @@ file = "two.yml"
 depth_min_mm = 1500.0
 classify = "default"
 [scan]
-timeout_ms = 60000
+timeout_ms = 600000
 exposure_skew_ms = 10000
 [server]
 socket = "slsd.sock"
@@ -134,7 +134,7 @@ class Record(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("2 scans, 0 failed", result.stdout)
         with self.replay() as service, service.client() as client:
-            told = [client.call("scan", timeout_ms=60000, frames="raw") for _ in range(2)]
+            told = [client.call("scan", timeout_ms=600000, frames="raw") for _ in range(2)]
             frames = [payload for event, payload in client.events if event["params"]["camera"] == "right"]
         for line, (result, cloud) in zip(lines_of(self.recording), told):
             recorded = (self.recording / line["cloud"]).read_bytes()
@@ -160,7 +160,7 @@ class Record(unittest.TestCase):
     def test_full_disk_ends_it_in_step(self):
         """A limit on a file's size stands for the full disk: the first camera's frame fits, the second's does not."""
         with self.two.client() as client:
-            client.call("scan", timeout_ms=60000, frames="png")
+            client.call("scan", timeout_ms=600000, frames="png")
             first, second = (len(payload) for _, payload in client.events)
         self.assertLess(first + 4096, second)
         script = f"trap '' XFSZ; ulimit -f {(first + second) // 2048}; exec \"$@\""

@@ -22,6 +22,8 @@ path = "{scene}/frame.png"
 file = "{scene}/calibration.yml"
 [frame]
 {frame}
+[scan]
+timeout_ms = 600000
 [server]
 socket = "slsd.sock"
 """
@@ -102,10 +104,10 @@ class RobotFrame(unittest.TestCase):
         for density, options in (("symbols", {}), ("pixels", {}), ("pixels", {"normals": True})):
             for form, read in (("ply", read_ply), ("pcd", read_pcd)):
                 with self.subTest(density=density, form=form, **options):
-                    about, in_base = client.call("scan", format=form, density=density, timeout_ms=60000, **options, **pose)
+                    about, in_base = client.call("scan", format=form, density=density, timeout_ms=600000, **options, **pose)
                     told = numpy.array(about["base_from_rig"]).reshape(4, 4)
                     numpy.testing.assert_allclose(told, base_from_rig, atol=1e-6)
-                    about, in_rig = client.call("scan", format=form, density=density, coordinate_frame="rig", timeout_ms=60000, **options)
+                    about, in_rig = client.call("scan", format=form, density=density, coordinate_frame="rig", timeout_ms=600000, **options)
                     self.assertNotIn("base_from_rig", about)
                     (base, header), (rig, plain) = read(in_base), read(in_rig)
                     self.same(base, rig, base_from_rig)
@@ -131,7 +133,7 @@ class RobotFrame(unittest.TestCase):
         with self.service() as service, service.client() as client:
             self.check_files(client, MOUNT)
             self.refused(client, "stands in the cell", robot_pose=POSE_UR, poses="ur")
-            about, _ = client.call("scan", format="tiff", density="pixels", timeout_ms=60000)
+            about, _ = client.call("scan", format="tiff", density="pixels", timeout_ms=600000)
             self.assertNotIn("base_from_rig", about)
             self.assertEqual(client.call("settings")[0]["hand_eye"], {"mounted": "cell"})
             client.call("subscribe", rate_hz=10)
@@ -169,32 +171,32 @@ class RobotFrame(unittest.TestCase):
     def test_box_and_plane_in_the_robots_base(self):
         for mounted, pose in (("cell", {}), ("arm", {"robot_pose": POSE_UR, "poses": "ur"})):
             with self.subTest(mounted), self.service(mounted) as service, service.client() as client:
-                points = read_ply(client.call("scan", timeout_ms=60000, **pose)[1])[0]
+                points = read_ply(client.call("scan", timeout_ms=600000, **pose)[1])[0]
                 at = places(points)
                 middle = numpy.median(at, axis=0)
                 box = [*(middle - 150), *(middle + 90)]
-                params = {"box": box, "box_frame": "robot_base", "timeout_ms": 60000, **pose}
+                params = {"box": box, "box_frame": "robot_base", "timeout_ms": 600000, **pose}
                 inside = ((at >= box[:3]) & (at <= box[3:])).all(axis=1)
                 self.assertTrue(50 < numpy.count_nonzero(inside) < len(at) - 50)
                 numpy.testing.assert_array_equal(places(read_ply(client.call("scan", **params)[1])[0]), at[inside])
                 rig = read_ply(client.call("scan", coordinate_frame="rig", **params)[1])[0]
                 self.assertEqual(len(rig), numpy.count_nonzero(inside))
                 pixels = {"density": "pixels", **params}
-                whole = read_ply(client.call("scan", density="pixels", timeout_ms=60000, **pose)[1])[0]
+                whole = read_ply(client.call("scan", density="pixels", timeout_ms=600000, **pose)[1])[0]
                 of_box = ((places(whole) >= box[:3]) & (places(whole) <= box[3:])).all(axis=1)
                 self.assertLess(abs(len(read_ply(client.call("scan", **pixels)[1])[0]) - numpy.count_nonzero(of_box)), 20)
                 normal = numpy.array([0.48, -0.6, 0.64])
                 above = at @ normal > normal @ middle
-                plane = read_ply(client.call("scan", plane=[*normal, float(normal @ middle)], box_frame="robot_base", timeout_ms=60000, **pose)[1])[0]
+                plane = read_ply(client.call("scan", plane=[*normal, float(normal @ middle)], box_frame="robot_base", timeout_ms=600000, **pose)[1])[0]
                 numpy.testing.assert_array_equal(places(plane), at[above])
                 self.refused(client, "no camera sees the box .* in the robot's base", **{**params, "box": [*(middle + 9000), *(middle + 9100)]})
                 if mounted == "arm":
                     self.refused(client, 'add the robot\'s pose .* "box_frame": "rig"', coordinate_frame="rig", box=box, box_frame="robot_base")
                 client.call("set", cloud={"box": box, "box_frame": "robot_base"})
-                self.assertEqual(client.call("preview", timeout_ms=60000)[0]["points"], len(at))
+                self.assertEqual(client.call("preview", timeout_ms=600000)[0]["points"], len(at))
                 if mounted == "arm":
                     self.refused(client, "no poses come with a stream: .* box and plane are in the robot's base", "subscribe", coordinate_frame="rig")
-                self.assertEqual(client.call("scan", timeout_ms=60000, **pose)[0]["points"], numpy.count_nonzero(inside))
+                self.assertEqual(client.call("scan", timeout_ms=600000, **pose)[0]["points"], numpy.count_nonzero(inside))
 
     def test_box_in_the_robots_base_needs_its_place(self):
         with Service() as service, service.client() as client:

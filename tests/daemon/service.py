@@ -28,7 +28,7 @@ path = "{camera_path}"
 [calibration]
 file = "{scene}/calibration.yml"
 [scan]
-timeout_ms = 60000
+timeout_ms = 600000
 reopen_first_ms = 20
 reopen_longest_ms = 50
 [server]

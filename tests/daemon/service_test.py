@@ -59,7 +59,7 @@ class Scan(unittest.TestCase):
             try:
                 with self.service.client() as client:
                     for _ in range(5):
-                        scans.append(client.call("scan", timeout_ms=60000)[0]["scan"])
+                        scans.append(client.call("scan", timeout_ms=600000)[0]["scan"])
             except Exception as problem:  # pylint: disable=broad-except
                 problems.append(problem)
 
@@ -184,7 +184,7 @@ class Faults(unittest.TestCase):
                 with self.assertRaises(RpcError) as caught:
                     client.call("scan", timeout_ms=200)
                 self.assertEqual(caught.exception.name, "timeout")
-                client.request("scan", timeout_ms=60000)
+                client.request("scan", timeout_ms=600000)
                 part = frame.with_suffix(".part")
                 part.write_bytes((SCENE / "frame.png").read_bytes())
                 part.rename(frame)

@@ -40,7 +40,7 @@ class Decoding(unittest.TestCase):
             self.assertIsNone(reply["not_kept"])
             scan = client.call("scan", density="symbols")[0]
             self.assertEqual(scan["points"], 0)  # the plane is at 2 m
-            self.assertEqual(client.call("scan", timeout_ms=60000)[0]["density"], "pixels")
+            self.assertEqual(client.call("scan", timeout_ms=600000)[0]["density"], "pixels")
             self.assertEqual(configured(client)["set"], reply["set"])
             self.assertEqual(configured(client)["configuration"]["decode"]["density"], "pixels")
             client.call("reload")
@@ -62,7 +62,7 @@ class Decoding(unittest.TestCase):
             for stride in (8.5, 1e300):
                 with self.assertRaisesRegex(RpcError, "dense_stride_px"):
                     client.call("set", decode={"dense_stride_px": stride})
-            self.assertGreater(client.call("scan", timeout_ms=60000.0)[0]["points"], 2000)
+            self.assertGreater(client.call("scan", timeout_ms=600000.0)[0]["points"], 2000)
             client.call("set", pattern={"symbol_size_px": 16.0, "symbols": [11.0, 13, 14, 18, 19]})
             self.assertEqual(configured(client)["configuration"]["pattern"]["symbol_size_px"], 16)
 

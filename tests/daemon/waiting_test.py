@@ -83,14 +83,14 @@ class WhileADeviceIsAbsent(unittest.TestCase):
             with service.client() as client:
                 client.request("scan", timeout_ms=600000)
                 wait_until(lambda: other.call("status")[0]["cameras"][0]["state"] == "capturing", "the camera")
-            result, cloud = other.call("scan", timeout_ms=60000)
+            result, cloud = other.call("scan", timeout_ms=600000)
             self.assertEqual(len(vertices(cloud)), result["points"])
 
 
 class LostFrames(unittest.TestCase):
     def test_are_taken_again_and_told(self):
         with Service(camera='faults = ["drop@1", "tear@2", "stale@3"]') as service, service.client() as client:
-            result, cloud = client.call("scan", timeout_ms=60000)
+            result, cloud = client.call("scan", timeout_ms=600000)
             self.assertEqual(result["tries"], 4)
             self.assertEqual([lost["data"]["name"] for lost in result["lost_tries"]],
                              ["frame_dropped", "frame_torn", "frame_stale"])
