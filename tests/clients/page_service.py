@@ -57,6 +57,13 @@ class Web:
     def get(self, path, **headers):
         return self.ask("GET", path, headers={**self.secret, **headers})
 
+    def cloud(self, density, after):
+        """The next live cloud. A service that takes more than 10 s for one is asked again, as by the page."""
+        while True:
+            status, headers, ply = self.get(f"/api/cloud?density={density}&after={after}")
+            if status != 204:
+                return status, headers, ply
+
     def post(self, path, **body):
         return self.ask("POST", path, json.dumps(body))
 

@@ -40,7 +40,7 @@ class Clouds(unittest.TestCase):
             def watch():
                 after = 0
                 for _ in range(2):
-                    status, headers, ply = web.get(f"/api/cloud?density=pixels&after={after}")
+                    status, headers, ply = web.cloud("pixels", after)
                     about = json.loads(headers["X-Slsd-About"])
                     after = about["number"]
                     sizes.append((status, len(ply) > 18 * about["points"] > 1_000_000))
@@ -66,7 +66,7 @@ class Clouds(unittest.TestCase):
             def watch():
                 after = 0
                 for _ in range(5):
-                    status, headers, ply = web.get(f"/api/cloud?density=symbols&after={after}")
+                    status, headers, ply = web.cloud("symbols", after)
                     about = json.loads(headers["X-Slsd-About"])
                     seen.append((status, about["number"] > after, len(vertices(ply)) == about["points"]))
                     after = about["number"]
