@@ -36,8 +36,8 @@ Result<std::invoke_result_t<Function>> without_throwing(const Function& function
   } catch (const client::ProtocolError& error) {
     return fail(ErrorCode::kMalformed, error.what());
   } catch (const client::ScannerError& error) {
-    const bool gone = error.name() == "disconnected";
-    return gone ? fail(ErrorCode::kDisconnected, error.what()) : fail(ErrorCode::kIo, error.what(), error.where());
+    const ErrorCode code = error.name() == "disconnected" ? ErrorCode::kDisconnected : ErrorCode::kIo;
+    return fail(code, error.what(), error.where());
   }
 }
 

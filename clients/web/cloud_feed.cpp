@@ -45,9 +45,9 @@ void CloudFeed::run(const std::stop_token& stop) {
       newest_.reset();  // it would be old by the next request
       if (!changed_.wait(lock, stop, [this] { return wanted(); })) return;
     }
-    Failure failed = follow(stop);
+    std::optional<Failure> failed = follow(stop);
     std::unique_lock lock(mutex_);
-    if (!wanted()) continue;
+    if (!failed || !wanted()) continue;
     failure_ = std::move(failed);
     ++failures_;
     changed_.notify_all();
@@ -55,8 +55,8 @@ void CloudFeed::run(const std::stop_token& stop) {
   }
 }
 
-// Receives until nobody wants the clouds any more, or an error occurs.
-Failure CloudFeed::follow(const std::stop_token& stop) {
+// Receives until an error occurs, or nobody wants the clouds any more.
+std::optional<Failure> CloudFeed::follow(const std::stop_token& stop) {
   auto connection = Connection::open(socket_);
   if (!connection) return failure(connection.error());
   connection->set_timeout(kTimeout);
@@ -71,7 +71,7 @@ Failure CloudFeed::follow(const std::stop_token& stop) {
     auto event = connection->receive();
     if (!event) return failure(event.error());
     const std::lock_guard lock(mutex_);
-    if (stop.stop_requested() || !wanted()) return failure({ErrorCode::kCancelled, "no page is watching", {}});
+    if (stop.stop_requested() || !wanted()) return std::nullopt;
     nlohmann::json params = event->message.value("params", nlohmann::json::object());
     if (event->message.value("method", "") == "cloud" && params.contains("memfd_bytes")) {
       newest_ =

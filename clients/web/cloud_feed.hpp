@@ -38,7 +38,7 @@ class CloudFeed {
 
  private:
   void run(const std::stop_token& stop);
-  [[nodiscard]] Failure follow(const std::stop_token& stop);
+  [[nodiscard]] std::optional<Failure> follow(const std::stop_token& stop);
   [[nodiscard]] bool wanted() const;
 
   std::filesystem::path socket_;

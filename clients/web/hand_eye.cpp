@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "clients/usage/hand_eye_usage.hpp"
+#include "clients/web/away.hpp"
 #include "clients/web/look_folder.hpp"
 #include "core/geometry/robot_pose.hpp"
 #include "core/printable.hpp"
@@ -38,7 +39,6 @@ constexpr auto kProgramEnds = 5min;
 constexpr std::size_t kOutputBytesMax = 16 << 20;
 constexpr std::size_t kChoicesBytesMax = 1 << 16;
 constexpr std::size_t kTextMax = 200;
-constexpr int kNoService = 3;  // exit status of slsctl, if no service answers
 
 const std::array<const char*, 2> kMountings = {"arm", "cell"};
 
@@ -169,7 +169,11 @@ Result<Ended> run_program(const std::vector<std::string>& arguments) {
 }
 
 /// The program's error as the page shows it: with the ends of its lines.
-json error_of(const json& told) {
+json error_of(const json& told, const path& socket) {
+  if (is_away(told.value("/data/name"_json_pointer, ""), told.value("/data/where"_json_pointer, ""), socket)) {
+    const Refusal away = no_service(socket);
+    return {{"name", away.name}, {"message", away.message}};
+  }
   std::string message = told.value("message", "it gave no reason");
   for (std::size_t at = 0; (at = message.find("\\n", at)) != std::string::npos;) message.replace(at, 2, "\n");
   return {{"name", told.value("/data/name"_json_pointer, "error")}, {"message", std::move(message)}};
@@ -306,9 +310,8 @@ std::optional<Refusal> HandEye::run(const std::string& pose) {
   if (ended->status == 0) return std::nullopt;
   if (error_.is_null()) error_ = {{"name", "error"}, {"message", "the program ended early: see the log of slsd-web"}};
   const std::string name = error_["name"];
-  if (ended->status != kNoService && name != "permission_denied") return std::nullopt;
-  return Refusal{ended->status == kNoService ? 503 : 403, ended->status == kNoService ? "no_service" : name,
-                 std::exchange(error_, nullptr)["message"]};
+  if (name != "no_service" && name != "permission_denied") return std::nullopt;
+  return Refusal{name == "no_service" ? 503 : 403, name, std::exchange(error_, nullptr)["message"]};
 }
 
 void HandEye::note(const std::vector<json>& told) {
@@ -318,7 +321,7 @@ void HandEye::note(const std::vector<json>& told) {
       line.erase("look");
       seen_[name] = std::move(line);
     } else if (line.contains("error")) {
-      error_ = error_of(line["error"]);
+      error_ = error_of(line["error"], socket_);
     } else {
       outcome_ = std::move(line);
       std::error_code ignored;

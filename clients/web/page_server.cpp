@@ -13,6 +13,7 @@
 
 #include "clients/connection/connection.hpp"
 #include "clients/slsctl/client_commands.hpp"
+#include "clients/web/away.hpp"
 #include "clients/web/boards.hpp"
 #include "core/base64.hpp"
 #include "core/printable.hpp"
@@ -49,23 +50,8 @@ Answer refusal(int status, const std::string& name, const std::string& message) 
   return answer_of({status, name, message});
 }
 
-Answer refusal(const Failure& failure) {
-  const std::string& name = failure.error.name;
-  const int status = failure.exit_status == kNoDaemon ? 503
-                     : name == "permission_denied"    ? 403
-                     : name == "invalid_params"       ? 400
-                     : name == "busy"                 ? 503
-                                                      : 502;
-  const std::string where = failure.error.where.empty() ? "" : failure.error.where + ": ";
-  return refusal(status, failure.exit_status == kNoDaemon ? "no_service" : name, where + failure.error.message);
-}
-
 Answer json_answer(const json& value) {
   return {200, "application/json", client::Bytes(to_line(value)), {}, {}};
-}
-
-Answer result_or_refusal(const tl::expected<Answered, Failure>& answered) {
-  return answered ? json_answer(answered->reply.message["result"]) : refusal(answered.error());
 }
 
 std::string parameter(const Request& request, const char* name) {
@@ -125,6 +111,17 @@ bool is_density(const std::string& text) {
 
 bool is_loopback(const std::string& address) {
   return address.starts_with("127.") || address == "::1" || address == "localhost";
+}
+
+Answer PageServer::refusal_of(const Failure& failure) const {
+  const std::string &name = failure.error.name, &where = failure.error.where;
+  if (is_away(name, where, options_.socket)) return answer_of(no_service(options_.socket));
+  const int status = name == "permission_denied" ? 403 : name == "invalid_params" ? 400 : name == "busy" ? 503 : 502;
+  return refusal(status, name, (where.empty() ? "" : where + ": ") + failure.error.message);
+}
+
+Answer PageServer::result_or_refusal(const tl::expected<Answered, Failure>& answered) const {
+  return answered ? json_answer(answered->reply.message["result"]) : refusal_of(answered.error());
 }
 
 PageServer::PageServer(PageOptions options, Token token)
@@ -248,7 +245,7 @@ void PageServer::add_requests() {
   get("/api/past", [this](const Request& request) { return past(request); });
   get("/api/metrics", [this](const Request&) {
     const auto answered = call("metrics", {{"format", "prometheus"}}, kTimeout);
-    if (!answered) return refusal(answered.error());
+    if (!answered) return refusal_of(answered.error());
     return Answer{200, "text/plain; version=0.0.4; charset=utf-8", answered->reply.bytes, {}, {}};
   });
   get("/api/exposure", [this](const Request& request) {
@@ -256,7 +253,7 @@ void PageServer::add_requests() {
     options.socket = options_.socket;
     options.camera = parameter(request, "camera");
     const auto advice = look_at_exposure(options);
-    return advice ? json_answer(*advice) : refusal(advice.error());
+    return advice ? json_answer(*advice) : refusal_of(advice.error());
   });
   get("/api/presets", [this](const Request&) { return result_or_refusal(call("presets", json::object(), kTimeout)); });
   get("/api/boards", [this](const Request&) { return boards(); });
@@ -298,9 +295,9 @@ tl::expected<Answered, Failure> PageServer::call(const char* method, const json&
 
 Answer PageServer::status() {
   const auto status = call("status", json::object(), kTimeoutOfStatus);
-  if (!status) return refusal(status.error());
+  if (!status) return refusal_of(status.error());
   const auto settings = call("settings", json::object(), kTimeoutOfStatus);
-  if (!settings) return refusal(settings.error());
+  if (!settings) return refusal_of(settings.error());
   const json& set = settings->reply.message["result"];
   const json configuration = set.value("configuration", json::object());
   json result{{"status", status->reply.message["result"]},
@@ -326,7 +323,7 @@ Answer PageServer::image(const Request& request, const char* method) const {
   const bool raw = parameter(request, "format") == "raw" && method == std::string_view("frame");
   if (raw) params["format"] = "raw";
   auto answered = call(method, params, kTimeout);
-  if (!answered) return refusal(answered.error());
+  if (!answered) return refusal_of(answered.error());
   const json about = answered->reply.message["result"];
   return {200,
           raw ? "application/octet-stream" : "image/png",
@@ -340,7 +337,7 @@ Answer PageServer::reasons(const Request& request) const {
   json params{{"why", true}};
   if (const std::string camera = parameter(request, "camera"); !camera.empty()) params["camera"] = camera;
   const auto answered = call("preview", params, kTimeout);
-  if (!answered) return refusal(answered.error());
+  if (!answered) return refusal_of(answered.error());
   const json& about = answered->reply.message["result"];
   return json_answer({{"png", to_base64(answered->reply.bytes)}, {"reasons", about.value("reasons", json::array())}});
 }
@@ -399,7 +396,7 @@ Answer PageServer::cloud(const Request& request) {
   if (!is_density(density) || wrong != std::errc() || end != text.data() + text.size())
     return refusal(400, "invalid_params", "\"density\" must be \"symbols\" or \"pixels\", and \"after\" a number");
   const auto next = (density == "pixels" ? pixels_ : symbols_).next(after, kWaitForCloud);
-  if (!next) return refusal(next.error());
+  if (!next) return refusal_of(next.error());
   if (!*next) return {204, "", {}, {}, {}};
   json about = brief((*next)->about);
   about["number"] = (*next)->number;
@@ -420,7 +417,7 @@ Answer PageServer::scan(const json& body) {
     keep({{{"time", utc_text_ms(std::chrono::system_clock::now())},
            {"error", printable(answered.error().error.message, 300)}},
           {}});
-    return refusal(answered.error());
+    return refusal_of(answered.error());
   }
   if (!answered->reply.message["result"].contains("memfd_bytes"))
     return refusal(502, "malformed", "the service did not send the cloud as a memfd: its version differs");

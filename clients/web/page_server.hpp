@@ -75,6 +75,8 @@ class PageServer {
   [[nodiscard]] std::optional<Answer> refuse(const Request& request);
   [[nodiscard]] tl::expected<Answered, Failure> call(const char* method, const nlohmann::json& params,
                                                      std::chrono::seconds timeout) const;
+  [[nodiscard]] Answer refusal_of(const Failure& failure) const;
+  [[nodiscard]] Answer result_or_refusal(const tl::expected<Answered, Failure>& answered) const;
   [[nodiscard]] Answer index(const Page& page, const Request& request);
   [[nodiscard]] Answer log_in(const Request& request, const nlohmann::json& body);
   [[nodiscard]] Answer status();

@@ -13,6 +13,7 @@ import threading
 import time
 import unittest
 
+from impostor import Impostor
 from page_service import BIN, TIMEOUT_S, TOKEN, Web, name_of, resident_mib
 from service import Service, wait_until
 
@@ -196,6 +197,27 @@ class Door(unittest.TestCase):
                 self.assertEqual(name_of(web.get("/api/status")), (503, "no_service"))
                 self.assertEqual(web.get("/")[0], 200)
                 self.assertEqual(name_of(web.get("/api/cloud?density=symbols&after=0")), (503, "no_service"))
+
+    def test_a_service_that_hangs_up_or_stops_counts_as_away(self):
+        def stopping(request):
+            error = {"code": -32013, "message": "the service is stopping", "data": {"name": "cancelled"}}
+            return json.dumps({"jsonrpc": "2.0", "id": request["id"], "error": error}).encode() + b"\n"
+
+        def answers(impostor):
+            with Web(impostor) as web:
+                got = [web.get("/api/" + path) for path in ("status", "frame", "reasons", "metrics", "exposure", "presets",
+                                                            "calibration", "cloud?density=pixels&after=0")]
+                got += [web.post("/api/" + path) for path in ("scan", "set", "preset", "calibrate")]
+                self.assertEqual([name_of(answer) for answer in got], [(503, "no_service")] * len(got))
+                return [json.loads(answer[2])["error"]["message"] for answer in got]
+
+        for answer in (lambda request: b"", stopping):
+            with Impostor(answer, hangs_up=True) as impostor:
+                impostor.socket = impostor.path
+                messages = answers(impostor)
+            self.assertEqual(messages, answers(impostor))  # as if nothing listens
+            self.assertEqual(set(messages), {f"{impostor.path}: no service answers there: start slsd "
+                                             "(sudo systemctl start slsd), or wait if it restarts"})
 
     def test_the_printed_address_is_exchanged_for_a_session(self):
         with Service() as service, Web(service) as web:

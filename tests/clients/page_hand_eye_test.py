@@ -300,8 +300,16 @@ class Requests(HandEye):
                 self.assertEqual(name_of(web.post("/api/hand_eye/act", **pose)), (403, "permission_denied"))
         service = Service(configuration=self.cell.text(0))
         with Web(service, "--hand-eye", self.looks) as web:
-            self.assertEqual(name_of(web.post("/api/hand_eye/act", **pose)), (503, "no_service"))
+            away = web.post("/api/hand_eye/act", **pose)
+            self.assertEqual(name_of(away), (503, "no_service"))
             self.assertIsNone(json.loads(web.get("/api/hand_eye")[2])["error"])
+            self.assertEqual(away[2], web.get("/api/presets")[2])
+        with Impostor(lambda request: b"", hangs_up=True) as impostor:
+            impostor.socket = impostor.path
+            with Web(impostor, "--hand-eye", self.looks) as web:
+                gone = web.post("/api/hand_eye/act", **pose)
+                self.assertEqual(name_of(gone), (503, "no_service"))
+                self.assertEqual(gone[2], web.get("/api/presets")[2])
 
 
 if __name__ == "__main__":
