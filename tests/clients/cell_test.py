@@ -95,7 +95,7 @@ class Merged(Folder):
             yield other
         finally:
             other.terminate()
-            other.wait(20)
+            other.wait(600)
 
     def points(self, message):
         self.assertEqual([tuple(field) for field in message["fields"]], FIELDS)

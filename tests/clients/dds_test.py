@@ -148,7 +148,7 @@ class Listener:
 
     def __exit__(self, *_):
         self.process.terminate()
-        self.process.wait(20)
+        self.process.wait(600)
         self.thread.join()
         self.process.stdout.close()
 
@@ -181,7 +181,7 @@ class Bridge:
     def __exit__(self, *_):
         self.process.send_signal(signal.SIGTERM)
         try:
-            self.process.wait(20)
+            self.process.wait(600)
         finally:
             self.process.kill()
             self.process.wait()
@@ -283,7 +283,7 @@ class Shown(unittest.TestCase):
     def test_another_of_the_same_name_is_told(self):
         probe("left/points", "PointCloud2")  # it is there
         with Bridge(self.service) as second:
-            self.assertEqual(second.process.wait(30), 1)
+            self.assertEqual(second.process.wait(600), 1)
             self.assertIn("name_taken", second.said())
 
     def test_buffers_too_small_for_a_dense_cloud_are_told(self):
@@ -507,7 +507,7 @@ class Strangers(unittest.TestCase):
             for other in others:
                 other.terminate()
             for other in others:
-                other.wait(30)
+                other.wait(600)
 
     def test_that_are_not_there_are_not_waited_for(self):
         with Service() as service, Bridge(service, "--peer", "192.0.2.1", "--peer", "192.0.2.2", "--rate", "5", name="known"), \
@@ -593,7 +593,7 @@ class ExtrinsicsFile(unittest.TestCase):
                                (self.GOOD.replace("[0, -1", "[0, -2"), "not a rotation"),
                                (self.GOOD.replace("100, 0, 50", "100, 0"), "3 numbers")):
                 with Bridge(service, "--extrinsics", self.write(text)) as bridge:
-                    self.assertEqual(bridge.process.wait(30), 1)
+                    self.assertEqual(bridge.process.wait(600), 1)
                     self.assertIn(name, bridge.said())
 
     def test_says_where_the_scanner_stands(self):

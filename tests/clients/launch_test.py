@@ -302,7 +302,7 @@ class LaunchFile(Seen):
         finally:
             for process in running:
                 process.send_signal(signal.SIGINT)  # as ros2 launch does
-            self.assertEqual([process.wait(60) for process in running], [0, 0])
+            self.assertEqual([process.wait(600) for process in running], [0, 0])
 
     def test_shows_a_recorded_frame(self):
         with self.launched() as service:
@@ -342,7 +342,7 @@ class Ros2(Seen):
                 self.shows("left", service)
             finally:
                 launched.send_signal(signal.SIGINT)
-                launched.wait(60)
+                launched.wait(600)
 
 
 if __name__ == "__main__":

@@ -268,7 +268,7 @@ class Door(unittest.TestCase):
             manager = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
             self.addCleanup(manager.close)
             manager.bind(f"{folder}/notify")
-            manager.settimeout(30)
+            manager.settimeout(600)
             environment = {**os.environ, "NOTIFY_SOCKET": f"{folder}/notify", "RUNTIME_DIRECTORY": f"{folder}/run"}
             os.mkdir(f"{folder}/run")
             web = subprocess.Popen([BIN / "slsd-web", "--socket", service.socket, "--port", "0"], stdout=subprocess.DEVNULL, env=environment)

@@ -230,7 +230,7 @@ class Ending(unittest.TestCase):
                                           env={**os.environ, "PYTHONPATH": str(HERE.parents[1] / "clients/python")})
                 reader.stdout.readline()
                 reader.send_signal(end)
-                reader.wait(60)
+                reader.wait(600)
                 reader.stdout.close()
                 wait_until(lambda: scanner.status()["subscribers"] == 0, "no subscriber")
             self.assertGreater(len(scanner.scan(timeout_s=60)), 0)  # behind what was begun for them

@@ -52,7 +52,7 @@ class Life(unittest.TestCase):
             frame, image = client.events[0]
             self.assertEqual(len(image), frame["params"]["bytes"])
             self.assertGreater(len(image), 500_000)
-            self.assertEqual(service.process.wait(60), 0)
+            self.assertEqual(service.process.wait(600), 0)
 
     def test_sigterm_while_a_client_reads_nothing(self):
         with Service() as service, service.client() as client:
@@ -188,7 +188,7 @@ class Life(unittest.TestCase):
             path = os.path.join(folder, "notify")
             with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
                 manager.bind(path)
-                manager.settimeout(60)
+                manager.settimeout(600)
                 service = Service(environment={"NOTIFY_SOCKET": path, "WATCHDOG_USEC": "300000"})
                 service.launch()
                 messages = []
@@ -218,10 +218,10 @@ class Life(unittest.TestCase):
             path = os.path.join(folder, "notify")
             with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
                 manager.bind(path)
-                manager.settimeout(60)
+                manager.settimeout(600)
                 service = Service(configuration='"a\\nREADY=1" = 1\n', environment={"NOTIFY_SOCKET": path})
                 service.launch()
-                self.assertEqual(service.process.wait(60), 78)
+                self.assertEqual(service.process.wait(600), 78)
                 told = manager.recv(4096).decode()
                 self.assertIn("STATUS=does not start: ", told)
                 self.assertIn("no such table or key: a\\nREADY=1", told)

@@ -84,7 +84,7 @@ class Robot:
         self.ended.set()
         self.thread.join()
         self.process.stdin.close()
-        self.process.wait(30)
+        self.process.wait(600)
 
 
 def printing(*options, flange="tool0"):
