@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <span>
 
@@ -27,6 +28,11 @@ class EpipolarSegment {
   /// Position along the line, projector px.
   [[nodiscard]] double along_px(const Eigen::Vector2d& projector_direction) const {
     return axis_.dot(projector_direction);
+  }
+  /// Distance of a projector direction beyond the nearer end, along the line, projector px; negative between the ends.
+  [[nodiscard]] double outside_px(const Eigen::Vector2d& projector_direction) const {
+    const double along = along_px(projector_direction);
+    return std::max(along_min_px_ - along, along - along_max_px_);
   }
   /// Tells whether a projector direction lies within tolerance_px of the segment's line, and between its ends.
   [[nodiscard]] bool passes(const Eigen::Vector2d& projector_direction, double tolerance_px) const {

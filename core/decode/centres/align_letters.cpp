@@ -9,8 +9,10 @@
 
 #include <Eigen/LU>
 
+#include "core/clones.hpp"
 #include "core/code/symbol.hpp"
 #include "core/decode/centres/align_symbols.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -40,46 +42,139 @@ Grey8 draw_letters(const PatternOptions& pattern) {
   return image;
 }
 
+/// The letter, its light and the limits of a pixel's light, for the pixels of a square.
+struct LightOfLetter {
+  const std::uint32_t* samples;  ///< of the letters' field
+  int field_width, field_height;
+  float slope_unit;
+  Eigen::Vector2f origin, right, down;  ///< projector px under the task's centre, and their change for a camera px
+  float gain, gain_x, gain_y, offset;
+  float limit;     ///< grey levels by which the light of a pixel that agrees may be off
+  float lit_from;  ///< grey levels of a pixel that is lit
+};
+
+/// A rectangle of the frame, within it. Positions are relative to the task's centre.
+template <class T>
+struct SquareOfFrame {
+  const T* first;
+  std::ptrdiff_t stride;
+  int left, top, columns, rows;
+};
+
+/// Numbers of pixels, see LightShares.
+struct LightCounts {
+  int agree = 0, brighter = 0, beside = 0, darkened = 0;
+};
+
+/// PatternField::at() for eight pixels.
+inline __attribute__((always_inline)) void find_letter(const LightOfLetter& of, const Lanes& x, float y,
+                                                       Lanes& letter) {
+  constexpr float kScale = PatternField::kSamplesPerPx;
+  constexpr int kBits = PatternField::kSlopeBits;
+  using BitLanes [[gnu::vector_size(32)]] = std::uint32_t;
+  const auto place = [](const Lanes& px, int count, Lanes& to) __attribute__((always_inline)) {
+    const Lanes zero{}, last = zero + static_cast<float>(count - 1);
+    to = (px + PatternField::kBorderPx) * kScale;
+    to = to > zero ? to : zero;
+    to = to < last ? to : last;
+  };
+  Lanes i, j;
+  place(of.origin.x() + x * of.right.x() + y * of.down.x(), of.field_width, i);
+  place(of.origin.y() + x * of.right.y() + y * of.down.y(), of.field_height, j);
+  const IntLanes column = __builtin_convertvector(i + 0.5F, IntLanes),
+                 row = __builtin_convertvector(j + 0.5F, IntLanes);
+  const IntLanes at = row * of.field_width + column;
+  BitLanes bits;
+  for (int lane = 0; lane < kLanes; ++lane) bits[lane] = of.samples[at[lane]];
+  const IntLanes value = reinterpret_cast<IntLanes>(bits >> (2 * kBits)),
+                 steps_u = reinterpret_cast<IntLanes>(bits << (32 - 2 * kBits)) >> (32 - kBits),
+                 steps_v = reinterpret_cast<IntLanes>(bits << (32 - kBits)) >> (32 - kBits);
+  const Lanes from_u = i - __builtin_convertvector(column, Lanes), from_v = j - __builtin_convertvector(row, Lanes);
+  const Lanes slope_u = __builtin_convertvector(steps_u, Lanes) * of.slope_unit,
+              slope_v = __builtin_convertvector(steps_v, Lanes) * of.slope_unit;
+  letter =
+      __builtin_convertvector(value, Lanes) * PatternField::kValueUnit + (slope_u * from_u + slope_v * from_v) / kScale;
+}
+
+template <class T>
+inline __attribute__((always_inline)) void count_lights(const SquareOfFrame<T>& square, const LightOfLetter& of,
+                                                        LightCounts& to) {
+  constexpr float kInk = 0.2F;   // smallest share of the unprinted light that print leaves
+  constexpr float kDark = 0.4F;  // share of the letter's light
+  IntLanes agree{}, brighter{}, beside{}, darkened{};
+  for (int down = 0; down < square.rows; ++down) {
+    const T* const pixels = square.first + down * square.stride;
+    const auto y = static_cast<float>(square.top + down);
+    for (int right = 0; right < square.columns; right += kLanes) {
+      const int count = square.columns - right;
+      Lanes level{};
+      if (count >= kLanes) {
+        load(pixels + right, level);
+      } else {
+        for (int lane = 0; lane < count; ++lane) level[lane] = static_cast<float>(pixels[right + lane]);
+      }
+      const IntLanes counts = kIntLane < count;
+      const Lanes x = kLane + static_cast<float>(square.left + right);
+      Lanes letter;
+      find_letter(of, x, y, letter);
+      const Lanes expected = (of.gain + of.gain_x * x + of.gain_y * y) * letter, light = level - of.offset;
+      const Lanes more = light - expected, ink = kInk * expected;
+      agree -= counts & (more <= of.limit) & (-more <= of.limit);
+      brighter -= counts & (light - of.gain > of.limit);
+      beside -= counts & (more > of.limit) & (letter < kDark) & (light > of.lit_from);
+      darkened -= counts & (-more > of.limit) & (light > of.limit) & (light > ink);
+    }
+  }
+  for (int lane = 0; lane < kLanes; ++lane) {
+    to.agree += agree[lane], to.brighter += brighter[lane];
+    to.beside += beside[lane], to.darkened += darkened[lane];
+  }
+}
+
 /// @param reach  px from the middle to the square's sides
 LightShares shares_of_square(const LetterScene& scene, const AskedLetter& asked, const Eigen::Vector2f& middle_px,
                              int reach) {
-  constexpr float kInk = 0.2F;                // smallest share of the unprinted light that print leaves
-  constexpr float kDark = 0.4F, kLit = 0.3F;  // shares of the letter's light; of the light around it
+  constexpr float kLit = 0.3F;  // share of the light around the letter
   const PatchTask& task = asked.task;
   const PatchState& state = task.state;
-  const float limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain);
-  const float usual_gain = asked.place.peak - asked.place.background;
-  const Eigen::Vector2i middle = middle_px.array().round().matrix().cast<int>();
   // The letter lies in the plane of the grid around it.
   const Eigen::Vector2f from = projector_offset(task.map, state, {0, 0}),
                         right = projector_offset(task.map, state, {1, 0}) - from,
-                        down = projector_offset(task.map, state, {0, 1}) - from,
-                        origin = from + task.map.origin_px.cast<float>();
-  const auto letter_at = [&](const Eigen::Vector2f& off) {
-    const Eigen::Vector2f pixel = origin + off.x() * right + off.y() * down;
-    return scene.letters.at(pixel.x(), pixel.y()).value;
+                        down = projector_offset(task.map, state, {0, 1}) - from;
+  const LightOfLetter of{.samples = scene.letters.samples(),
+                         .field_width = scene.letters.width(),
+                         .field_height = scene.letters.height(),
+                         .slope_unit = scene.letters.slope_unit(),
+                         .origin = from + task.map.origin_px.cast<float>(),
+                         .right = right,
+                         .down = down,
+                         .gain = state.gain,
+                         .gain_x = state.gain_x,
+                         .gain_y = state.gain_y,
+                         .offset = state.offset,
+                         .limit = kAlign.outlier_sigmas * std::hypot(task.noise, kAlign.misfit_share * state.gain),
+                         .lit_from = kLit * (asked.place.peak - asked.place.background)};
+  const Eigen::Vector2i middle = middle_px.array().round().matrix().cast<int>();
+  LightCounts counts;
+  std::visit(
+      [&]<class T>(const ImageView<T>& view) {
+        const int left = std::max(middle.x() - reach, 0), top = std::max(middle.y() - reach, 0);
+        const int columns = std::min(middle.x() + reach + 1, view.width) - left,
+                  rows = std::min(middle.y() + reach + 1, view.height) - top;
+        if (columns <= 0 || rows <= 0) return;
+        const SquareOfFrame<T> square{view.row(top) + left, view.stride, left - task.x, top - task.y, columns, rows};
+        Cloned<count_lights<T>>::call(square, of, counts);
+      },
+      scene.frame);
+  const auto share = [pixels = (2 * reach + 1) * (2 * reach + 1)](int of_them) {
+    return static_cast<float>(of_them) / static_cast<float>(pixels);
   };
-  const auto count = [&](const auto& view) {
-    int agree = 0, brighter = 0, beside = 0, darkened = 0;
-    for (int y = middle.y() - reach; y <= middle.y() + reach; ++y) {
-      for (int x = middle.x() - reach; x <= middle.x() + reach; ++x) {
-        if (!view.contains(x, y)) continue;
-        const Eigen::Vector2f off(static_cast<float>(x - task.x), static_cast<float>(y - task.y));
-        const float letter = letter_at(off);
-        const float expected = (state.gain + state.gain_x * off.x() + state.gain_y * off.y()) * letter;
-        const float light = static_cast<float>(view.at(x, y)) - state.offset;
-        agree += std::abs(light - expected) <= limit;
-        brighter += light - state.gain > limit;
-        beside += light - expected > limit && letter < kDark && light > kLit * usual_gain;
-        darkened += expected - light > limit && light > std::max(limit, kInk * expected);
-      }
-    }
-    const auto share = [pixels = (2 * reach + 1) * (2 * reach + 1)](int of_them) {
-      return static_cast<float>(of_them) / static_cast<float>(pixels);
-    };
-    return LightShares{share(agree), share(brighter), share(beside), share(darkened)};
-  };
-  return std::visit(count, scene.frame);
+  return {share(counts.agree), share(counts.brighter), share(counts.beside), share(counts.darkened)};
+}
+
+bool has_other_light(const AskedLetter& asked, const LightShares& cell) {
+  constexpr float kOfCell = 0.06F;
+  return !asked.task.failed && cell.beside >= kOfCell;
 }
 
 }  // namespace
@@ -167,8 +262,7 @@ LightShares LetterAligner::shares_of_cell(const LetterScene& scene, const AskedL
 }
 
 bool LetterAligner::shows_other_light(const LetterScene& scene, const AskedLetter& asked) const {
-  constexpr float kOfCell = 0.06F;
-  return !asked.task.failed && shares_of_cell(scene, asked).beside >= kOfCell;
+  return has_other_light(asked, shares_of_cell(scene, asked));
 }
 
 float LetterAligner::support_beside_print(const LetterScene& scene, const AskedLetter& asked) const {
@@ -188,7 +282,9 @@ void LetterAligner::take_over(const LetterScene& scene, const AskedLetter& asked
   seen.claims[node].decide(DecodeRule::kRecovered);
   // Near an edge in depth, the visible part of a symbol may fit the letter of either side.
   constexpr float kDistanceWhole = 2.5F, kDistanceAtEdge = 4;
-  const bool at_edge = shows_other_light(scene, asked) || support_beside_print(scene, asked) < kWholeBesidePrintMin;
+  const LightShares cell = shares_of_cell(scene, asked);
+  const bool at_edge =
+      has_other_light(asked, cell) || std::max(task.support, cell.agree_beside_print()) < kWholeBesidePrintMin;
   seen.aligned[node] = at_edge ? Aligned::kAtEdge : Aligned::kWhole;
   seen.nodes[node].split = at_edge;
   seen.shapes[node] = Classification::of_letter(letter_of(seen.claims[node]), array_->letters,

@@ -24,11 +24,11 @@ class CellGate {
 
   /// @param off_line_px  additional distance from its line that this node may have
   [[nodiscard]] bool admits(std::int32_t node, int row, int column, double off_line_px = 0) const {
-    return segments_.empty() || segments_[node].passes(cells_.ray(row, column).direction, tolerance_px_ + off_line_px);
+    return segments_.empty() || segments_[node].passes(cells_.direction(row, column), tolerance_px_ + off_line_px);
   }
   /// Signed distance of the cell from the node's epipolar line, projector px; 0 without known lines.
   [[nodiscard]] double residual_px(std::int32_t node, int row, int column) const {
-    return segments_.empty() ? 0 : segments_[node].residual_px(cells_.ray(row, column).direction);
+    return segments_.empty() ? 0 : segments_[node].residual_px(cells_.direction(row, column));
   }
   [[nodiscard]] double off_line_px(std::int32_t node, int row, int column) const {
     return std::abs(residual_px(node, row, column));
@@ -39,7 +39,7 @@ class CellGate {
   /// lines it is the direction of the rows.
   [[nodiscard]] Eigen::Vector2f way_of_line(std::int32_t node, int row, int column) const {
     if (segments_.empty()) return {1, 0};
-    const auto off_line = [&](int r, int c) { return segments_[node].residual_px(cells_.ray(r, c).direction); };
+    const auto off_line = [&](int r, int c) { return segments_[node].residual_px(cells_.direction(r, c)); };
     const int down = row + 1 < cells_.rows() ? 1 : -1, right = column + 1 < cells_.columns() ? 1 : -1;
     const double here = off_line(row, column);
     return Eigen::Vector2d((off_line(row + down, column) - here) * down, (here - off_line(row, column + right)) * right)
@@ -48,32 +48,42 @@ class CellGate {
   }
   [[nodiscard]] bool knows_lines() const { return !segments_.empty(); }
   /// Calls visit(row, column) for the candidate cells of a node: one for each column, or for each row, that its
-  /// epipolar line crosses.
+  /// epipolar line crosses within the working depth.
   /// @param off_line_px  additional distance from its line that this node may have
   template <class Visit>
   void visit_along(std::int32_t node, double off_line_px, Visit&& visit) const {
     const EpipolarSegment& segment = segments_[static_cast<std::size_t>(node)];
     if (segment.empty()) return;
-    const auto off_line = [&](int row, int column) { return segment.residual_px(cells_.ray(row, column).direction); };
+    const double tolerance_px = tolerance_px_ + off_line_px;
+    const auto off_line = [&](int row, int column) { return segment.residual_px(cells_.direction(row, column)); };
     const int last_row = cells_.rows() - 1, last_column = cells_.columns() - 1;
     const double first = off_line(0, 0);
     const double per_row = (off_line(last_row, 0) - first) / std::max(1, last_row);
     const double per_column = (off_line(0, last_column) - first) / std::max(1, last_column);
     const bool is_steep = std::abs(per_column) > std::abs(per_row);
     const int last_along = is_steep ? last_row : last_column, last_across = is_steep ? last_column : last_row;
-    const double slope = is_steep ? per_column : per_row;
-    const auto off_line_at = [&](int along, int across) {
-      return is_steep ? off_line(along, across) : off_line(across, along);
+    const double per_slope = 1 / (is_steep ? per_column : per_row);
+    const double across_per_along = -(is_steep ? per_row : per_column) * per_slope;
+    const auto direction = [&](int along, int across) -> const Eigen::Vector2d& {
+      return is_steep ? cells_.direction(along, across) : cells_.direction(across, along);
     };
-    double across = -first / slope;
-    for (int along = 0; along <= last_along; ++along) {
-      // Predict from the previous cell: lens distortion bends the line only gradually.
-      const int before = static_cast<int>(std::lround(std::clamp<double>(across, 0, last_across)));
-      across = before - off_line_at(along, before) / slope;
-      const auto nearest = static_cast<int>(std::lround(std::clamp<double>(across, -1, last_across + 1)));
-      if (nearest < 0 || nearest > last_across) continue;
-      const int row = is_steep ? along : nearest, column = is_steep ? nearest : along;
-      if (admits(node, row, column, off_line_px)) visit(row, column);
+    // From one place to the next, a line at 45 degrees or less moves by 1.5 pitches; a bent one by a little more.
+    const double per_step = 1 / (kStepMaxPitches * pitch_px());
+    double across = -first * per_slope;
+    for (int along = 0; along <= last_along;) {
+      // Predict from the previous cell: lens distortion bends the line only gradually. Numbers are rounded by casts.
+      const int before = static_cast<int>(std::clamp<double>(across, 0, last_across) + 0.5);
+      across = before - segment.residual_px(direction(along, before)) * per_slope;
+      const int nearest = static_cast<int>(std::clamp<double>(across, -1, last_across + 1) + 1.5) - 1;
+      const Eigen::Vector2d& there = direction(along, std::clamp(nearest, 0, last_across));
+      const int beyond = static_cast<int>(std::min<double>(segment.outside_px(there) * per_step, last_along));
+      if (beyond > 0) {
+        along += beyond, across += beyond * across_per_along;
+        continue;
+      }
+      if (nearest >= 0 && nearest <= last_across && segment.passes(there, tolerance_px))
+        is_steep ? visit(along, nearest) : visit(nearest, along);
+      ++along;
     }
   }
   /// Distance between adjacent cells, projector px.
@@ -82,6 +92,8 @@ class CellGate {
   }
 
  private:
+  static constexpr double kStepMaxPitches = 2.5;
+
   const CellRays& cells_;
   std::span<const EpipolarSegment> segments_;
   double tolerance_px_;

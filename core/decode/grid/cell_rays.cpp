@@ -11,6 +11,7 @@ CellRays::CellRays(const Pattern& pattern, const std::vector<Prototype>& prototy
       const Eigen::Vector2d square(pattern.symbol_centre_u_px(column), pattern.symbol_centre_v_px(row));
       pixels_.push_back(square + prototypes[pattern.array.at(row, column)].centroid_px.cast<double>());
       rays_.push_back(pixel_ray(projector, pixels_.back()));
+      directions_.push_back(rays_.back().direction);
     }
   }
 }

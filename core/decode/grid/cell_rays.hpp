@@ -21,6 +21,8 @@ class CellRays {
   [[nodiscard]] int columns() const { return columns_; }
   [[nodiscard]] const Eigen::Vector2d& pixel(int row, int column) const { return pixels_[index(row, column)]; }
   [[nodiscard]] const PixelRay& ray(int row, int column) const { return rays_[index(row, column)]; }
+  /// The ray's direction, for searches of many cells.
+  [[nodiscard]] const Eigen::Vector2d& direction(int row, int column) const { return directions_[index(row, column)]; }
 
  private:
   [[nodiscard]] std::size_t index(int row, int column) const {
@@ -28,7 +30,7 @@ class CellRays {
   }
 
   int rows_, columns_;
-  std::vector<Eigen::Vector2d> pixels_;
+  std::vector<Eigen::Vector2d> pixels_, directions_;
   std::vector<PixelRay> rays_;
 };
 

@@ -33,22 +33,26 @@ CellProposer::CellProposer(const CodeArray& array, std::shared_ptr<const Codeboo
           static_cast<std::uint8_t>(array.at(row, column));
 }
 
-float CellProposer::window_nats(std::int32_t node, std::int32_t cell) const {
+CellProposer::WindowEvidence CellProposer::evidence_around(std::int32_t node) const {
+  WindowEvidence window;
+  const Neighbourhood& around = around_[static_cast<std::size_t>(node)];
+  for (int i = 0; i < kWindowCells; ++i) window[i] = nats_[static_cast<std::size_t>(around[i] + 1)].data();
+  return window;
+}
+
+float CellProposer::window_nats(const WindowEvidence& window, std::int32_t cell) const {
   const std::uint8_t* const middle =
       letters_.data() + (grid_.row_of(cell) + 1) * static_cast<std::ptrdiff_t>(stride_) + grid_.column_of(cell) + 1;
-  const Neighbourhood& around = around_[static_cast<std::size_t>(node)];
   float nats = 0;
-  for (int i = 0; i < kWindowCells; ++i) {
-    const std::uint8_t letter = middle[(i / kWindowSide - 1) * stride_ + i % kWindowSide - 1];
-    nats += nats_[static_cast<std::size_t>(around[i] + 1)][letter];
-  }
+  for (int i = 0; i < kWindowCells; ++i)
+    nats += window[i][middle[(i / kWindowSide - 1) * stride_ + i % kWindowSide - 1]];
   return nats;
 }
 
 CellProposer::Proposal CellProposer::weigh(std::int32_t node, std::int32_t cell) const {
   const auto there =
       std::ranges::count_if(around_[static_cast<std::size_t>(node)], [](std::int32_t other) { return other >= 0; });
-  const float nats = window_nats(node, cell);
+  const float nats = window_nats(evidence_around(node), cell);
   return {cell, nats, there >= kCertainLetters && nats >= kCertainShare * log_letters_ * static_cast<float>(there)};
 }
 
@@ -70,9 +74,10 @@ CellProposer::Proposal CellProposer::best_on_line(const Frame& frame, std::int32
       frame.shapes[static_cast<std::size_t>(node)].is_well_seen() ? 0 : kOffLineShare * frame.gate.pitch_px();
   std::int32_t best = -1;
   float most = 0;
+  const WindowEvidence window = evidence_around(node);
   frame.gate.visit_along(node, off_line_px, [&](int row, int column) {
     const std::int32_t cell = grid_.at(row, column);
-    if (const float nats = window_nats(node, cell); nats > most) best = cell, most = nats;
+    if (const float nats = window_nats(window, cell); nats > most) best = cell, most = nats;
   });
   return best < 0 ? Proposal{} : weigh(node, best);
 }

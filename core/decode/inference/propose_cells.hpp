@@ -43,7 +43,10 @@ class CellProposer {
     float nats = 0;
     bool certain = false;  ///< most letters of its window are present and agree
   };
-  [[nodiscard]] float window_nats(std::int32_t node, std::int32_t cell) const;
+  /// The nats of the letters that each node of a 3x3 window may show.
+  using WindowEvidence = std::array<const float*, kWindowCells>;
+  [[nodiscard]] WindowEvidence evidence_around(std::int32_t node) const;
+  [[nodiscard]] float window_nats(const WindowEvidence& window, std::int32_t cell) const;
   [[nodiscard]] Proposal weigh(std::int32_t node, std::int32_t cell) const;
   [[nodiscard]] Proposal continued(const Frame& frame, std::int32_t node, std::int32_t first) const;
   [[nodiscard]] Proposal best_on_line(const Frame& frame, std::int32_t node) const;

@@ -5,11 +5,27 @@
 #include <algorithm>
 #include <limits>
 
+#include "core/clones.hpp"
+
 namespace slsd {
 namespace {
 
 /// Value of a tile that has no pixel of the region near it.
 constexpr float kNone = std::numeric_limits<float>::lowest();
+
+/// @param thresholds   one for each tile and one more
+/// @param tiles, shares  for each pixel: the tile whose centre lies before it, and its place up to that of the next
+/// @param lit          becomes 255 for each pixel above its threshold, and 0 for others
+template <class T>
+inline __attribute__((always_inline)) void light_run(const T* pixels, int count, const float* thresholds,
+                                                     const std::int32_t* tiles, const float* shares,
+                                                     std::uint8_t* lit) {
+#pragma omp simd
+  for (int x = 0; x < count; ++x) {
+    const float before = thresholds[tiles[x]], after = thresholds[tiles[x] + 1];
+    lit[x] = static_cast<float>(pixels[x]) > before + shares[x] * (after - before) ? 255 : 0;
+  }
+}
 
 }  // namespace
 
@@ -30,21 +46,34 @@ void RegionSeparator::visit_around(int column, int row, Visit&& visit) const {
   }
 }
 
+/// Finds the range of each column over the rows of a tile, and then over the columns of a tile.
 template <class T>
 void RegionSeparator::measure_tiles(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
-  const int tile = options_.tile_px;
-  columns_ = (region.width_px() + tile - 1) / tile, rows_ = (region.height_px() + tile - 1) / tile;
+  const int tile = options_.tile_px, width = region.width_px();
+  columns_ = (width + tile - 1) / tile, rows_ = (region.height_px() + tile - 1) / tile;
   tiles_.assign(static_cast<std::size_t>(columns_) * rows_, {std::numeric_limits<float>::max(), kNone});
-  for (const Run& run : runs) {
-    const T* pixels = frame.row(run.row);
-    TileRange* row = tiles_.data() + (run.row - region.top) / tile * columns_;
-    for (int x = run.left; x < run.right;) {
-      const int column = (x - region.left) / tile;
-      const int end = std::min<int>(run.right, region.left + (column + 1) * tile);
-      const auto [least, greatest] = std::minmax_element(pixels + x, pixels + end);
-      row[column].least = std::min(row[column].least, static_cast<float>(*least));
-      row[column].greatest = std::max(row[column].greatest, static_cast<float>(*greatest));
-      x = end;
+  auto run = runs.begin();
+  for (int row = 0; row < rows_; ++row) {
+    least_.assign(width, std::numeric_limits<std::uint16_t>::max()), greatest_.assign(width, 0);
+    for (; run != runs.end() && run->row < region.top + (row + 1) * tile; ++run) {
+      const T* const pixels = frame.row(run->row) + run->left;
+      std::uint16_t *const least = least_.data() + run->left - region.left, *const greatest = greatest_.data() +
+                                                                                              run->left - region.left;
+      const int count = run->right - run->left;
+#pragma omp simd
+      for (int x = 0; x < count; ++x) {
+        least[x] = std::min<std::uint16_t>(least[x], pixels[x]);
+        greatest[x] = std::max<std::uint16_t>(greatest[x], pixels[x]);
+      }
+    }
+    for (int column = 0; column < columns_; ++column) {
+      const int first = column * tile, last = std::min(first + tile, width);
+      std::uint16_t least = std::numeric_limits<std::uint16_t>::max(), greatest = 0;
+      for (int x = first; x < last; ++x)
+        least = std::min(least, least_[x]), greatest = std::max(greatest, greatest_[x]);
+      if (least <= greatest)
+        tiles_[static_cast<std::size_t>(row) * columns_ + column] = {static_cast<float>(least),
+                                                                     static_cast<float>(greatest)};
     }
   }
 }
@@ -77,35 +106,42 @@ void RegionSeparator::set_thresholds(float contrast_min) {
   }
 }
 
+/// Interpolates the thresholds of a row of tiles to a row of pixels.
+void RegionSeparator::interpolate(int row) {
+  const float v = std::clamp((static_cast<float>(row) + 0.5F) / static_cast<float>(options_.tile_px) - 0.5F, 0.F,
+                             static_cast<float>(rows_ - 1));
+  const int above = static_cast<int>(v), below = std::min(above + 1, rows_ - 1);
+  const float share = v - static_cast<float>(above);
+  for (int c = 0; c < columns_; ++c) {
+    const float upper = threshold_[above * columns_ + c], lower = threshold_[below * columns_ + c];
+    line_[c] = upper + share * (lower - upper);
+  }
+  line_[columns_] = line_[columns_ - 1];
+}
+
 /// Lights pixels above the thresholds, interpolated between the tiles' centres.
 template <class T>
 void RegionSeparator::compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
   const auto tile = static_cast<float>(options_.tile_px);
-  mask_.clear(region.width_px(), region.height_px());
+  const int width = region.width_px(), words = (width + Mask::kWordPx - 1) / Mask::kWordPx;
+  mask_.clear(width, region.height_px());
   line_.resize(columns_ + 1);
-  int row = -1;
-  for (const Run& run : runs) {
-    if (run.row != row) {
-      row = run.row;
-      const float v =
-          std::clamp((static_cast<float>(row - region.top) + 0.5F) / tile - 0.5F, 0.F, static_cast<float>(rows_ - 1));
-      const int above = static_cast<int>(v), below = std::min(above + 1, rows_ - 1);
-      const float share = v - static_cast<float>(above);
-      for (int c = 0; c < columns_; ++c) {
-        const float upper = threshold_[above * columns_ + c], lower = threshold_[below * columns_ + c];
-        line_[c] = upper + share * (lower - upper);
-      }
-      line_[columns_] = line_[columns_ - 1];
+  tile_of_.resize(width), share_of_.resize(width);
+  for (int x = 0; x < width; ++x) {
+    const float u = std::clamp((static_cast<float>(x) + 0.5F) / tile - 0.5F, 0.F, static_cast<float>(columns_ - 1));
+    tile_of_[x] = static_cast<int>(u), share_of_[x] = u - static_cast<float>(tile_of_[x]);
+  }
+  for (auto run = runs.begin(); run != runs.end();) {
+    const int row = run->row;
+    interpolate(row - region.top);
+    lit_.assign(static_cast<std::size_t>(words) * Mask::kWordPx, 0);
+    for (; run != runs.end() && run->row == row; ++run) {
+      const std::ptrdiff_t from = run->left - region.left;
+      Cloned<light_run<T>>::call(frame.row(row) + run->left, run->right - run->left, line_.data(),
+                                 tile_of_.data() + from, share_of_.data() + from, lit_.data() + from);
     }
-    const T* pixels = frame.row(run.row);
-    for (int x = run.left; x < run.right; ++x) {
-      const float u =
-          std::clamp((static_cast<float>(x - region.left) + 0.5F) / tile - 0.5F, 0.F, static_cast<float>(columns_ - 1));
-      const int column = static_cast<int>(u);
-      const float share = u - static_cast<float>(column);
-      const float threshold = line_[column] + share * (line_[column + 1] - line_[column]);
-      if (static_cast<float>(pixels[x]) > threshold) mask_.light(x - region.left, run.row - region.top);
-    }
+    for (int word = 0; word < words; ++word)
+      mask_.row(row - region.top)[word] = top_bits(lit_.data() + static_cast<std::ptrdiff_t>(word) * Mask::kWordPx);
   }
 }
 

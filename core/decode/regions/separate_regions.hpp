@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -60,6 +61,7 @@ class RegionSeparator {
   template <class T>
   void measure_tiles(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
   void set_thresholds(float contrast_min);
+  void interpolate(int row);
   template <class T>
   void compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs);
   template <class Visit>
@@ -68,7 +70,11 @@ class RegionSeparator {
   SeparateOptions options_;
   int columns_ = 0, rows_ = 0;  // number of tiles
   std::vector<TileRange> tiles_;
+  std::vector<std::uint16_t> least_, greatest_;  // for each column of pixels, within a row of tiles
   std::vector<float> midway_, threshold_, line_;
+  std::vector<std::int32_t> tile_of_;  // for each column of pixels, and its share of the next tile
+  std::vector<float> share_of_;
+  std::vector<std::uint8_t> lit_;  // of a row of pixels
   Mask mask_;
   RegionFinder finder_;
   Regions parts_;

@@ -145,9 +145,12 @@ bool SymbolReview::is_inside(const Sightings& seen, std::size_t node) const {
 
 /// Measures frames, and with them distances, again around symbols that are no longer trusted.
 void SymbolReview::measure_around_distrusted(const GridLinker& linker, Sightings& seen) {
+  is_around_.assign(seen.size(), 0);
+  for (const std::int32_t node : distrusted_)
+    visit_measured_with(seen.nodes, node, [&](std::int32_t other) { is_around_[other] = 1; });
   const auto visit = [&](auto&& each) {
-    for (const std::int32_t node : distrusted_)
-      visit_measured_with(seen.nodes, node, [&](std::int32_t other) { each(static_cast<std::size_t>(other)); });
+    for (std::size_t i = 0; i < seen.size(); ++i)
+      if (is_around_[i] != 0) each(i);
   };
   visit([&](std::size_t i) { linker.measure_frame(seen.nodes, trusted_, i); });
   // Measure all frames first: a distance may use those around it.

@@ -81,6 +81,7 @@ class SymbolReview {
   std::vector<std::uint8_t> trusted_;
   std::vector<std::uint8_t> decoded_;  // for each node, at the start of the review
   std::vector<std::int32_t> distrusted_;
+  std::vector<std::uint8_t> is_around_;  // for each node: whether its frame is measured with one that is distrusted
   std::vector<Eigen::Vector2f> light_changes_;  // relative change from cell to cell along u and v
 };
 

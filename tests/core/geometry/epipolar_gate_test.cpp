@@ -56,6 +56,24 @@ RC_GTEST_PROP(EpipolarGate, StopsEveryPointBeyondTheWorkingDepth, ()) {
   RC_ASSERT(passes(kMaxMm - 0.01));
 }
 
+// Negative between the ends; beyond them, as many pixels as the direction lies from the end.
+RC_GTEST_PROP(EpipolarGate, MeasuresHowFarAPointLiesOutside, ()) {
+  const Calibration rig = paper_rig();
+  const EpipolarGate gate(rig.cameras[0], rig.projector, kMinMm, kMaxMm);
+  const Eigen::Vector2d camera = rig.cameras[0].lens.undistort(any_pixel(rig.cameras[0].lens));
+  const EpipolarSegment segment = gate.prepare(camera);
+  const auto direction = [&](double depth) { return projector_direction(rig, depth * camera.homogeneous()); };
+  const auto distance_px = [&](double depth, double end) {
+    return ((direction(depth) - direction(end)).array() * Eigen::Array2d(rig.projector.fx, rig.projector.fy))
+        .matrix()
+        .norm();
+  };
+  const double near = kMinMm - uniform(0.01, 100), far = kMaxMm + uniform(0.01, 100000);
+  RC_ASSERT(segment.outside_px(direction(uniform(kMinMm + 0.01, kMaxMm - 0.01))) < 0);
+  RC_ASSERT(std::abs(segment.outside_px(direction(near)) - distance_px(near, kMinMm)) < 1e-6);
+  RC_ASSERT(std::abs(segment.outside_px(direction(far)) - distance_px(far, kMaxMm)) < 1e-6);
+}
+
 RC_GTEST_PROP(EpipolarGate, ResidualIsThatOfTriangulateToAFewPercent, ()) {
   const Calibration rig = paper_rig();
   const CalibratedCamera& camera = rig.cameras[0];

@@ -29,10 +29,10 @@ class CellGateOfATiltedLine : public testing::TestWithParam<int> {
     rig_.cameras[0].projector_from_camera.translation = 180 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
   }
 
-  [[nodiscard]] std::vector<EpipolarSegment> line_of(const Cell& cell) const {
+  [[nodiscard]] std::vector<EpipolarSegment> line_of(const Cell& cell, double depth_min_mm, double depth_max_mm) const {
     const RigidTransform& to_projector = rig_.cameras[0].projector_from_camera;
     const Eigen::Vector3d point = 2000 * cells_.ray(cell.first, cell.second).direction.homogeneous();
-    return {EpipolarGate(rig_.cameras[0], rig_.projector, 350, 3200)
+    return {EpipolarGate(rig_.cameras[0], rig_.projector, depth_min_mm, depth_max_mm)
                 .prepare((to_projector.rotation.transpose() * (point - to_projector.translation)).hnormalized())};
   }
 
@@ -41,12 +41,19 @@ class CellGateOfATiltedLine : public testing::TestWithParam<int> {
   Calibration rig_ = paper_rig();
 };
 
-// Followed, as found by looking at all of them.
+// Followed, as found by looking at all of them, wherever on the line the working depth begins and ends.
 TEST_P(CellGateOfATiltedLine, VisitsAllCellsOnIt) {
   constexpr double kTolerancePx = 1.5;
   std::size_t all = 0;
-  for (const Cell& from : {Cell(22, 35), {0, 0}, {43, 70}, {5, 66}, {40, 12}}) {
-    const auto segments = line_of(from);
+  struct Searched {
+    Cell from;
+    double depth_min_mm, depth_max_mm;
+  };
+  for (const auto& [from, depth_min_mm, depth_max_mm] :
+       {Searched{{22, 35}, 350, 3200}, Searched{{0, 0}, 350, 3200}, Searched{{43, 70}, 350, 3200},
+        Searched{{5, 66}, 350, 3200}, Searched{{40, 12}, 350, 3200}, Searched{{22, 35}, 1990, 2010},
+        Searched{{22, 60}, 1500, 2100}, Searched{{40, 12}, 1900, 2600}}) {
+    const auto segments = line_of(from, depth_min_mm, depth_max_mm);
     const CellGate gate(cells_, segments, kTolerancePx);
     std::vector<Cell> along, admitted;
     gate.visit_along(0, 0, [&](int row, int column) { along.emplace_back(row, column); });
