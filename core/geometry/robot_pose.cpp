@@ -16,7 +16,8 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 constexpr double kMetreMm = 1000;
-constexpr double kUnitMax = 0.01;  // pendants show three or four decimals
+constexpr double kUnitMax = 0.01;                        // pendants show three or four decimals
+constexpr double kNearestMm = 10, kFarthestMm = 20'000;  // of a flange from its base, with room to spare
 
 struct NamedNotation {
   const char* name;
@@ -182,6 +183,14 @@ Result<RigidTransform> read_robot_pose(std::span<const double> numbers, const Po
   const auto turn = read_turn(numbers.subspan(3), notation);
   if (!turn) return tl::unexpected(turn.error());
   return RigidTransform{*turn, notation.unit_mm * Eigen::Vector3d(numbers[0], numbers[1], numbers[2])};
+}
+
+Result<> check_reach(const RigidTransform& base_from_flange) {
+  const double distance_mm = base_from_flange.translation.norm();
+  if (distance_mm >= kNearestMm && distance_mm <= kFarthestMm) return {};
+  return fail(ErrorCode::kMismatch,
+              fmt::format("puts the flange {:.4g} mm from the robot's base, which must be {:g} mm to {:g} m",
+                          distance_mm, kNearestMm, kFarthestMm / kMetreMm));
 }
 
 std::vector<double> robot_numbers(const RigidTransform& pose, const PoseNotation& notation) {

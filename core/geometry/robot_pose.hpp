@@ -56,6 +56,11 @@ struct PoseNotation {
 /// @thread reentrant
 [[nodiscard]] Result<RigidTransform> read_robot_pose(std::span<const double> numbers, const PoseNotation& notation);
 
+/// Refuses a place that no robot reaches. Its numbers are of another unit, or of other frames.
+/// @errors kMismatch: the flange is nearer than 10 mm to the base, or further than 20 m
+/// @thread reentrant
+[[nodiscard]] Result<> check_reach(const RigidTransform& base_from_flange);
+
 /// The numbers that read_robot_pose() reads.
 /// @thread reentrant
 [[nodiscard]] std::vector<double> robot_numbers(const RigidTransform& base_from_flange, const PoseNotation& notation);

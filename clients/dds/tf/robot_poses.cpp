@@ -9,14 +9,15 @@
 
 #include <fmt/format.h>
 
+#include "core/geometry/robot_pose.hpp"
+
 namespace slsd::dds {
 namespace {
 
 using namespace std::chrono_literals;
 
 constexpr auto kStanding = 500ms, kStandingStep = 25ms;
-constexpr auto kStandingWait = 10s;                      // discovery takes some of it
-constexpr double kNearestMm = 10, kFarthestMm = 20'000;  // of a flange from its base, as the service has it
+constexpr auto kStandingWait = 10s;  // discovery takes some of it
 constexpr double kStandingMm = 0.3, kStandingDegrees = 0.03;
 
 RosTime ros_now() {
@@ -80,12 +81,13 @@ void RobotPoses::take(const Reader& reader, bool fixed) {
 Result<RigidTransform> RobotPoses::look_up(RosTime time) const {
   auto pose = tree_.base_from_flange(frames_.base, frames_.flange, time, ros_now());
   if (!pose) return pose;
-  const double distance_mm = pose->translation.norm();
-  if (distance_mm >= kNearestMm && distance_mm <= kFarthestMm) return pose;
-  return fail(ErrorCode::kMismatch,
-              fmt::format("tf_unreachable: tf puts \"{}\" {:.4g} mm from \"{}\": tf has metres, and these must be the "
-                          "frames of flange and base",
-                          frames_.flange, distance_mm, frames_.base));
+  const auto reached = check_reach(*pose);
+  if (reached) return pose;
+  return fail(
+      reached.error().code,
+      fmt::format("tf_unreachable: the pose of \"{}\" in \"{}\" {}: tf has metres, and these must be the frames of "
+                  "flange and base",
+                  frames_.flange, frames_.base, reached.error().message));
 }
 
 Result<RigidTransform> RobotPoses::at(RosTime time) const {

@@ -174,7 +174,6 @@ std::optional<RpcError> refused_frame(WantedInBase wanted, const AskedPose& pose
 }
 
 tl::expected<RigidTransform, RpcError> pose_of(const AskedPose& asked) {
-  constexpr double kNearestMm = 10, kFarthestMm = 20'000;  // of a flange from its base, with room to spare
   if (asked.notation.empty()) {
     return tl::unexpected(invalid_params(fmt::format("\"robot_pose\" needs \"poses\", how the robot writes them: {}",
                                                      fmt::join(pose_notation_names(), ", "))));
@@ -183,11 +182,10 @@ tl::expected<RigidTransform, RpcError> pose_of(const AskedPose& asked) {
   if (!notation) return tl::unexpected(invalid_params("\"poses\" " + notation.error().message));
   const auto pose = read_robot_pose(asked.numbers, *notation);
   if (!pose) return tl::unexpected(invalid_params("\"robot_pose\" " + pose.error().message));
-  const double distance_mm = pose->translation.norm();
-  if (distance_mm >= kNearestMm && distance_mm <= kFarthestMm) return *pose;
-  return tl::unexpected(
-      invalid_params(fmt::format("\"robot_pose\" puts the flange {:.4g} mm from the robot's base: in \"{}\" it has {}",
-                                 distance_mm, asked.notation, describe(*notation))));
+  if (const auto reached = check_reach(*pose); !reached)
+    return tl::unexpected(invalid_params(fmt::format("\"robot_pose\" {}: in \"{}\" it has {}", reached.error().message,
+                                                     asked.notation, describe(*notation))));
+  return *pose;
 }
 
 // Refuses parameters that exclude each other.

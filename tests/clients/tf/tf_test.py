@@ -156,7 +156,7 @@ class PrintPose(unittest.TestCase):
                      'tf_loop: tf has a loop: "loop" in "loop2" in "loop"'),
             "twice": ([("tf", "wrist", "twice", (0, 0, 1), IDENTITY, 0.0), ("tf", "world", "twice", (0, 0, 1), IDENTITY, 0.0)],
                       'tf_two_parents: "twice" is placed twice, moving in "wrist" and moving in "world"'),
-            "in_mm": ([("tf", "wrist", "in_mm", (0, 0, 150), IDENTITY, 0.0)], 'tf_unreachable: tf puts "in_mm" 1.'),
+            "in_mm": ([("tf", "wrist", "in_mm", (0, 0, 150), IDENTITY, 0.0)], 'tf_unreachable: the pose of "in_mm" in "base_link" puts the flange 1.'),
         }
         for flange, (transforms, message) in bad.items():
             with self.subTest(flange), Robot([BASE, TOOL], lambda _, more=transforms: [arm(), *more]):

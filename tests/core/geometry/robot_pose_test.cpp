@@ -99,6 +99,20 @@ TEST(ReadRobotPose, RefusesWhatIsNoPose) {
   EXPECT_THAT(message("matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 5, 5, 1}), HasSubstr("last column"));
 }
 
+TEST(CheckReach, RefusesPlacesOfAnotherUnit) {
+  const auto message = [](double x_mm, double y_mm, double z_mm) {
+    const auto reached = check_reach({Eigen::Matrix3d::Identity(), {x_mm, y_mm, z_mm}});
+    return reached ? std::string() : reached.error().message;
+  };
+  for (const double sign : {-1.0, 1.0}) {
+    EXPECT_EQ(message(0, 0, 10 * sign), "");
+    EXPECT_EQ(message(0, 12'000 * sign, 16'000), "");
+    EXPECT_EQ(message(6 * sign, 0, 7.9), "puts the flange 9.92 mm from the robot's base, which must be 10 mm to 20 m");
+    EXPECT_THAT(message(12'000, 0, 16'001 * sign), HasSubstr("puts the flange 2e+04 mm from the robot's base"));
+  }
+  EXPECT_THAT(message(0, 0, 0), HasSubstr("puts the flange 0 mm"));
+}
+
 TEST(PoseNotation, ListsTheNames) {
   const auto unknown = pose_notation("yaskawa");
   ASSERT_FALSE(unknown);
