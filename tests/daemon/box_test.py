@@ -121,6 +121,15 @@ class Box(unittest.TestCase):
             self.assertEqual(scan["points"], 0)
             self.assertIn("within the box", scan["empty"])
 
+    def test_without_symbols_says_where_it_looked(self):
+        with Service(camera_path=SCENE / "black.png") as service, service.client() as client:
+            service.wait_ready()
+            for density in (PIXEL_SCAN, {}):
+                whole, part = (client.call("scan", **box, **density)[0] for box in ({}, {"box": BOX}))
+                self.assertEqual((whole["points"], part["points"]), (0, 0))
+                self.assertIn("no symbol of the pattern was decoded", whole["empty"])
+                self.assertEqual(part["empty"], "in the part of the picture that can see the box: " + whole["empty"])
+
     def refused(self, method, **params):
         with self.assertRaises(RpcError) as refused:
             self.client.call(method, **params)
