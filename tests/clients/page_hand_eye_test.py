@@ -199,6 +199,25 @@ class Operator(HandEye):
             self.assertEqual(self.kept(), {})
             self.assertTrue(browser.run("return document.getElementById('hand-eye-result').hidden;"))
 
+    def test_a_robtarget_is_read_with_the_text_around_it(self):
+        place, turn, more = "[412.5,-231,6.12E+02]", "[0.5,-0.5,0.5,-0.5]", "[0,-1,0,1],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]"
+        pose = [412.5, -231, 612, 0.5, -0.5, 0.5, -0.5]
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+            service.wait_ready()
+            self.open(browser, web, 1280, 900)
+            browser.wait("handEyePlaced", "the kept choices do not come")
+            for text in (f"[{place},{turn},{more}]", f"  [{place}, {turn}, {more}] ", f"\t[ {place} , {turn} , {more} ]\u00a0",
+                         f"CONST robtarget p10:=[{place},{turn},{more}];", f"LOCAL PERS robtarget p{{3}} := [{place},{turn},{more}]; ! 2 of 12",
+                         f"VAR pose p10:=[{place},{turn}];", f"[{place},{turn}]", f"{place},{turn}", f" {place[1:-1]}, {turn[1:-1]} "):
+                self.enter(browser, text, notation="abb")
+                self.assertEqual(browser.run("return understandPose();"), pose, text)
+                self.assertRegex(browser.run("return document.getElementById('pose-read').textContent;"), r"^x 412.5 mm, .*, q4 -0.5$")
+            self.enter(browser, f"[{place},[0.5,0.5],{more}]", notation="abb")
+            self.assertIn("5 numbers instead of 7", browser.run("return document.getElementById('pose-read').textContent;"))
+            rows = "[[1,0,0,5],[0,1,0,6],[0,0,1,7],[0,0,0,1]]"
+            self.enter(browser, rows, notation="matrix")
+            self.assertEqual(browser.run("return understandPose();"), [1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1])
+
     def test_bad_input_is_named_and_keeps_nothing(self):
         late = self.cell.poses[3] @ robot.motion(robot.turn((1, 2, 0), 0.06), (25, -12, 8))  # the robot had not arrived
         with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:

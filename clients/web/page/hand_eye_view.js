@@ -28,8 +28,13 @@ let handEye = null, handEyeText = "", handEyePlaced = false;
 
 const needsOf = (notation) => kNotations[notation][1].length + kNotations[notation][3].length;
 
+// An ABB robtarget or pose: its place and turn without configuration, outer axes and the text around them.
+const kRobtarget = /\[\s*(\[[^[\]]*\]\s*,\s*\[[^[\]]*\])/;
+
 // The numbers of a pose as a robot writes or shows it: {X 412.5, Y -231, ...}, p[0.41, ...], [[x, y, z], [q1, ...]].
-function numbersOfPose(text) {
+function numbersOfPose(text, notation) {
+  const robtarget = notation === "abb" ? text.match(kRobtarget) : null;
+  if (robtarget) text = robtarget[1];
   return [...text.matchAll(/(?<![A-Za-z0-9_.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?/g)].map(([word]) => Number(word));
 }
 
@@ -41,7 +46,7 @@ function poseInWords(numbers, notation) {
 }
 
 function understandPose() {
-  const notation = $("notation").value, numbers = numbersOfPose($("robot-pose").value), needed = needsOf(notation);
+  const notation = $("notation").value, numbers = numbersOfPose($("robot-pose").value, notation), needed = needsOf(notation);
   const right = numbers.length === needed;
   $("pose-read").className = numbers.length === 0 || right ? "" : "bad";
   $("pose-read").textContent = numbers.length === 0 ? `${needed} numbers` :
