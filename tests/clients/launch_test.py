@@ -266,9 +266,11 @@ class LaunchFile(Seen):
 
     def test_passes_options_on(self):
         (_, _), (_, command) = self.started("name:=left", "socket:=/nowhere/s", "rate:=5", "density:=pixels", "stride:=4", "voxel:=2.5",
-                                            "image_rate:=0", "extrinsics:=cell of two.toml", "transforms:=false")
+                                            "image_rate:=0", "extrinsics:=cell of two.toml", "flange:=tool0", "robot_base:=foot",
+                                            "transforms:=false")
         self.assertEqual(command, ["--name", "left", "--socket", "/nowhere/s", "--rate", "5", "--density", "pixels", "--stride", "4",
-                                   "--voxel", "2.5", "--image-rate", "0", "--extrinsics", "cell of two.toml", "--no-transforms"])
+                                   "--voxel", "2.5", "--image-rate", "0", "--extrinsics", "cell of two.toml", "--flange", "tool0", "--robot-base", "foot",
+                                   "--no-transforms"])
         done = subprocess.run([BIN / "slsd-dds", *command, "--describe", HERE / "cell/left/calibration.yml"], capture_output=True,
                               timeout=600, check=False)
         self.assertEqual(done.returncode, 0)
@@ -288,6 +290,12 @@ class LaunchFile(Seen):
         self.assertEqual(rviz["remappings"], {"/scanner/points": "/top/points", "/scanner/robot_description": "/top/robot_description",
                                               "/scanner/camera/image_raw": "/top/left_eye/image_raw"})
         self.assertEqual(topics, set(rviz["remappings"]))
+
+    def test_shows_clouds_in_rviz_in_their_frame(self):
+        for arguments, frame in (([], "top_link"), (["extrinsics:=cell.toml"], "top_optical_frame"), (["flange:=tool0"], "base_link"),
+                                 (["flange:=tool0", "robot_base:=foot"], "foot"), (["robot_base:=foot"], "top_link")):
+            rviz = read("rviz:=true", "name:=top", "socket:=/nowhere/s", *arguments)["programs"][-1]
+            self.assertEqual(rviz["command"][-2:], ["-f", frame], arguments)
 
     @contextlib.contextmanager
     def launched(self, **environment):

@@ -17,6 +17,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 USUAL_SOCKET = '/run/slsd/slsd.sock'
+USUAL_BASE = 'base_link'
 RVIZ_CONFIG = os.path.join(os.path.dirname(os.path.dirname(os.path.abspath(__file__))), 'rviz', 'scanner.rviz')
 RESPAWN_S = 2.0
 WRONG_USAGE = (2, 78)  # exit codes of slsd and slsd-dds, if starting them again cannot help
@@ -34,10 +35,12 @@ ARGUMENTS = (
     ('voxel', '', 'one point per cube of this size in mm; default: all points'),
     ('image_rate', '2', 'images per second of each camera, if somebody subscribes; 0: none'),
     ('extrinsics', '', 'file with the places of several scanners; default: NAME_link is its root'),
+    ('flange', '', 'frame in tf of the flange that carries the scanner, such as tool0: puts clouds into robot_base'),
+    ('robot_base', '', f'frame of clouds in the robot\'s base; default: {USUAL_BASE}'),
     ('transforms', 'true', 'false: your robot description places the scanner\'s frames', ('true', 'false')),
     ('rviz', 'false', 'whether to start RViz', ('true', 'false')),
 )
-OPTIONS = ('rate', 'density', 'stride', 'voxel', 'image_rate', 'extrinsics')
+OPTIONS = ('rate', 'density', 'stride', 'voxel', 'image_rate', 'extrinsics', 'flange', 'robot_base')
 
 
 def program(name):
@@ -91,13 +94,12 @@ def service(wanted, config, path, state):
             lasting([program('slsd'), *(['--config', config] if config else [])])]
 
 
-def rviz(name, placed, state):
+def rviz(name, frame, state):
     """RViz, with the names in its configuration mapped to this scanner's names."""
     cameras = (state or {}).get('cameras') or [{'name': 'camera'}]
     camera = re.sub('[^A-Za-z0-9_]', '_', cameras[0]['name'])
     camera = camera if camera[:1].isalpha() else 'camera_' + camera
     topics = {'points': 'points', 'robot_description': 'robot_description', 'camera/image_raw': f'{camera}/image_raw'}
-    frame = f'{name}_optical_frame' if placed else f'{name}_link'
     return Node(package='rviz2', executable='rviz2', arguments=['-d', RVIZ_CONFIG, '-f', frame],
                 remappings=[(f'/scanner/{shown}', f'/{name}/{topic}') for shown, topic in topics.items()])
 
@@ -113,8 +115,10 @@ def start(context):
             command += ['--' + option.replace('_', '-'), given[option]]
     if given['transforms'] == 'false':
         command.append('--no-transforms')
+    own = given['name'] + ('_optical_frame' if given['extrinsics'] else '_link')
+    frame = (given['robot_base'] or USUAL_BASE) if given['flange'] else own
     return [*service(given['start_service'], config, path, state), lasting(command),
-            *([rviz(given['name'], given['extrinsics'], state)] if given['rviz'] == 'true' else [])]
+            *([rviz(given['name'], frame, state)] if given['rviz'] == 'true' else [])]
 
 
 def generate_launch_description():
