@@ -17,7 +17,7 @@ from service import BIN, wait_until
 
 HAS_DDS = (BIN / "slsd-dds").exists()
 if HAS_DDS:
-    from dds_test import DOMAIN, Bridge, Listener, States
+    from dds_bridge import DOMAIN, Bridge, Listener, States
 
 SEAM_MM = 0.5  # at 2 m
 FIELDS = [("x", 0, 7, 1), ("y", 4, 7, 1), ("z", 8, 7, 1), ("sigma", 12, 7, 1), ("intensity", 16, 7, 1), ("camera", 20, 2, 1),

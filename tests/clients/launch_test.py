@@ -24,7 +24,7 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 import numpy as np  # noqa: E402
 import yaml  # noqa: E402
 
-from dds_test import DOMAIN, matrix, probe, transforms, turn  # noqa: E402
+from dds_bridge import DOMAIN, matrix, probe, transforms, turn  # noqa: E402
 from ros_test import PYTHON, has_ros, node  # noqa: E402
 from service import BIN, Service, wait_until  # noqa: E402
 

@@ -21,7 +21,7 @@ import numpy as np  # noqa: E402
 
 import patience  # noqa: E402, F401
 import slsd  # noqa: E402
-from dds_test import DOMAIN, FIELDS, RECORD, Bridge  # noqa: E402
+from dds_bridge import DOMAIN, FIELDS, RECORD, Bridge  # noqa: E402
 from service import BIN, Service  # noqa: E402
 
 LOCALHOST = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}

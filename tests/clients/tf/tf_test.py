@@ -18,7 +18,7 @@ import numpy as np  # noqa: E402
 import robot_frame_test  # noqa: E402
 import patience  # noqa: E402, F401
 import slsd  # noqa: E402
-from dds_test import DOMAIN, LOOPBACK, RECORD, Bridge, Listener, States, probe, turn  # noqa: E402
+from dds_bridge import DOMAIN, LOOPBACK, RECORD, Bridge, Listener, States, probe, turn  # noqa: E402
 from service import BIN, SCENE, Service, slsctl, wait_until  # noqa: E402
 
 IDENTITY = (0, 0, 0, 1)
