@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -50,6 +52,40 @@ inline Seen see(const Surface& surface, const Grey8& image, const SimulationOpti
   return {rig, surface, simulate(image, rig, surface, options)};
 }
 
+/// A column in front of a wall.
+inline std::optional<double> column_and_wall(const Ray& ray) {
+  const auto wall = plane({0, 0, 2150}, {0, 0, 1})(ray), column = cylinder({0, 0, 2030}, {0, 1, 0}, 40)(ray);
+  return column ? column : wall;
+}
+
+inline const Seen& tilted() {
+  static const Seen seen = see(kTilted, draw_pattern(pattern()));
+  return seen;
+}
+
+inline const Seen& column() {
+  static const Seen seen = see(column_and_wall, draw_pattern(pattern()));
+  return seen;
+}
+
+/// An upright lath before a wall, leaning a little, as many px wide as that: narrower than any codeword.
+inline Surface lath(double width_px, double half_height_mm = 1000) {
+  return [=](const Ray& ray) -> std::optional<double> {
+    const auto wall = plane({0, 0, 2150}, {0, 0, 1})(ray), near = plane({0, 0, 2050}, {0.1, 0, -1})(ray);
+    const Eigen::Vector3d at = ray.origin + near.value_or(0) * ray.direction;
+    const double half_mm = 0.5 * width_px * 2050 / small_rig().cameras[0].lens.fx;
+    const bool on_it = near && std::abs(at.x() - 0.1 * at.y()) < half_mm && std::abs(at.y()) < half_height_mm;
+    return on_it ? near : wall;
+  };
+}
+
+inline Grey16 sixteen_bits(const Grey8& frame) {
+  Grey16 wide(frame.width(), frame.height());
+  std::transform(frame.data(), frame.data() + frame.size(), wide.data(),
+                 [](std::uint8_t level) { return 257 * level; });
+  return wide;
+}
+
 /// A decoder that has seen no frame, without making its constant data again.
 inline Decoder fresh_decoder() {
   static const Decoder first = Decoder::create(pattern(), small_rig(), 0, {}).value();
@@ -86,6 +122,22 @@ inline Measured measure_by(const DenseOptions& options, const GreyView& frame) {
   decode.dense = options;
   DenseMapper mapper(pattern(), small_rig(), 0, decode);
   return measure(frame, mapper);
+}
+
+/// What was measured nearer than that.
+inline DenseMap nearer_than(float depth_mm, DenseMap map) {
+  for (std::size_t pixel = 0; pixel < map.pixels.size(); ++pixel)
+    if (map.measured(pixel) && map.depth_mm[pixel] > depth_mm) map.drop(pixel, DensePixel::kNotReached);
+  map.count_pixels();
+  return map;
+}
+
+inline bool same(const DenseMap& a, const DenseMap& b) {
+  const auto equal = [](const auto& one, const auto& other) {
+    return one.size() == other.size() && std::memcmp(one.data(), other.data(), one.size() * sizeof one[0]) == 0;
+  };
+  return equal(a.depth_mm, b.depth_mm) && equal(a.sigma_mm, b.sigma_mm) && equal(a.intensity, b.intensity) &&
+         equal(a.pixels, b.pixels);
 }
 
 struct Score {
