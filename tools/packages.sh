@@ -12,7 +12,7 @@ build_packages=("${demo_packages[@]}"
   libcairo2-dev libgtest-dev libgmock-dev librapidcheck-dev libceres-dev
   libbenchmark-dev libv4l-dev libfuse3-dev libaravis-dev libusb-1.0-0-dev
   libegl-dev libgles-dev libgl1-mesa-dri libegl-mesa0 libglfw3-dev libx11-dev libxext-dev libxrandr-dev libxcb1-dev
-  libxcb-present-dev libboost-dev libfastrtps-dev libfastcdr-dev libopenvdb-dev)
+  libxcb-present-dev libboost-dev libfastrtps-dev libfastcdr-dev libopenvdb-dev lib3mf-dev)
 # For every room that is built alone; room_packages has the rest
 core_packages=(g++ cmake ninja-build pkg-config libeigen3-dev libfmt-dev libexpected-dev libgtest-dev libgmock-dev
   librapidcheck-dev python3 tzdata)

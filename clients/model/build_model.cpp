@@ -59,11 +59,21 @@ double way_degrees(std::span<const ModelFrame> frames) {
 ModelBuilder::ModelBuilder(Calibration calibration, const ModelOptions& options)
     : calibration_(std::move(calibration)), options_(options), tracker_(options.step_degrees) {}
 
+Result<> ModelBuilder::set_background(std::string_view ply) {
+  const auto points = read_dense_ply(ply);
+  if (!points) return tl::unexpected(points.error());
+  auto background = Background::of(*points, calibration_);
+  if (!background) return tl::unexpected(background.error());
+  background_ = std::move(*background);
+  return {};
+}
+
 Result<Shot> ModelBuilder::read_shot(std::string_view ply) const {
   const auto points = read_dense_ply(ply);
   if (!points) return tl::unexpected(points.error());
   auto images = range_images(*points, calibration_, options_.box);
   if (!images) return tl::unexpected(images.error());
+  if (background_) background_->remove_from(*images);
   return make_shot(std::move(*images));
 }
 

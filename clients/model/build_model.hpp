@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/model/adjust.hpp"
+#include "clients/model/background.hpp"
 #include "clients/model/range_image.hpp"
 #include "clients/model/seen_sides.hpp"
 #include "clients/model/track.hpp"
@@ -73,6 +74,10 @@ class ModelBuilder {
 
   ModelBuilder(Calibration calibration, const ModelOptions& options);
 
+  /// Leaves out what a cloud of the scene without the object shows.
+  /// @errors kMalformed: the PLY is no dense cloud; as of Background::of()
+  [[nodiscard]] Result<> set_background(std::string_view ply);
+
   /// Places one more cloud. @errors kMismatch: the first cloud is of another calibration
   [[nodiscard]] Result<Added> add(const std::string& name, std::string_view ply);
 
@@ -94,6 +99,7 @@ class ModelBuilder {
 
   Calibration calibration_;
   ModelOptions options_;
+  std::optional<Background> background_;
   Tracker tracker_;
   ModelReport report_;
   std::vector<std::string> names_;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "clients/model/build_model.hpp"
 #include "clients/model/live_clouds.hpp"
@@ -25,6 +26,8 @@ class LiveSession {
  public:
   LiveSession(LiveClouds clouds, const ModelOptions& model, const LiveOptions& options, Tell tell);
 
+  /// Leaves out what a cloud of the empty scene shows. @errors as ModelBuilder::set_background()
+  [[nodiscard]] Result<> set_background(std::string_view ply) { return builder_.set_background(ply); }
   /// Follows until a limit or the user ends it (Interrupt). @errors of LiveClouds
   [[nodiscard]] Result<> follow();
   [[nodiscard]] std::size_t placed() const { return builder_.placed(); }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <type_traits>
+#include <utility>
 
 namespace slsd::model {
 namespace {
@@ -51,9 +53,10 @@ Result<std::vector<Placed>> place(std::span<const DensePoint> points, std::size_
   return placed;
 }
 
-RangeImage crop(const std::vector<Placed>& placed, const CalibratedCamera& camera) {
+RangeImage crop(const std::vector<Placed>& placed, std::size_t number, const CalibratedCamera& camera) {
   RangeImage image{
-      camera.lens, camera.rig_from_camera.inverse(), camera.lens.width_px, camera.lens.height_px, 0, 0, {}, {}, {}};
+      number, camera.lens, camera.rig_from_camera.inverse(), camera.lens.width_px, camera.lens.height_px, 0, 0, {},
+      {},     {}};
   int right = 0, bottom = 0;
   for (const Placed& each : placed) {
     image.left = std::min(image.left, each.u), image.top = std::min(image.top, each.v);
@@ -75,6 +78,30 @@ RangeImage crop(const std::vector<Placed>& placed, const CalibratedCamera& camer
 
 }  // namespace
 
+void RangeImage::trim() {
+  int first_x = width, first_y = height, last_x = -1, last_y = -1;
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      if (std::isnan(depth_mm[index(x, y)])) continue;
+      first_x = std::min(first_x, x), last_x = std::max(last_x, x);
+      first_y = std::min(first_y, y), last_y = y;
+    }
+  }
+  if (last_y < 0) first_x = first_y = 0;
+  const int kept_width = last_x - first_x + 1, kept_height = last_y - first_y + 1;
+  const auto keep = [&](auto& values) {
+    std::remove_reference_t<decltype(values)> kept;
+    kept.reserve(static_cast<std::size_t>(kept_width) * static_cast<std::size_t>(kept_height));
+    for (int y = first_y; y <= last_y; ++y) {
+      const auto begin = values.begin() + static_cast<std::ptrdiff_t>(index(first_x, y));
+      kept.insert(kept.end(), begin, begin + kept_width);
+    }
+    values = std::move(kept);
+  };
+  keep(depth_mm), keep(sigma_mm), keep(intensity);
+  left += first_x, top += first_y, width = kept_width, height = kept_height;
+}
+
 Result<std::vector<RangeImage>> range_images(std::span<const DensePoint> points, const Calibration& calibration,
                                              const std::optional<Box>& box) {
   std::vector<RangeImage> images;
@@ -83,7 +110,7 @@ Result<std::vector<RangeImage>> range_images(std::span<const DensePoint> points,
   for (std::size_t camera = 0; camera < calibration.cameras.size(); ++camera) {
     const auto placed = place(points, camera, calibration.cameras[camera], box);
     if (!placed) return tl::unexpected(placed.error());
-    if (!placed->empty()) images.push_back(crop(*placed, calibration.cameras[camera]));
+    if (!placed->empty()) images.push_back(crop(*placed, camera, calibration.cameras[camera]));
   }
   return images;
 }

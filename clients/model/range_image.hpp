@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -18,6 +19,7 @@ namespace slsd::model {
 
 /// Measurement of one camera in one frame, cropped to the measured pixels.
 struct RangeImage {
+  std::size_t camera = 0;  ///< in the calibration's order
   Lens lens;
   RigidTransform camera_from_rig;
   int left = 0, top = 0, width = 0, height = 0;  ///< the crop, px of the camera
@@ -28,6 +30,8 @@ struct RangeImage {
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
   }
+  /// Crops to the pixels that are measured; to none if there is none.
+  void trim();
   /// Keeps only what the camera is.
   void drop_pixels() { depth_mm = {}, sigma_mm = {}, intensity = {}; }
   /// Pixel of the crop, unrounded, that sees a point of the camera's frame with z > 0.

@@ -14,6 +14,7 @@
 
 #include "clients/model/build_model.hpp"
 #include "clients/model/live_session.hpp"
+#include "clients/model/mesh_3mf.hpp"
 #include "clients/model/recorded_clouds.hpp"
 #include "clients/usage/usage.hpp"
 #include "core/mesh/mesh_file.hpp"
@@ -23,6 +24,8 @@
 namespace {
 
 using namespace slsd;
+
+constexpr const char* k3mf = ".3mf";
 
 int failed(const Error& error) {
   std::fprintf(stderr, "slsd-model: %s\n", to_string(error).c_str());
@@ -79,7 +82,7 @@ std::string to_text(const model::ModelReport& report, const Mesh& mesh) {
 
 struct Options {
   std::filesystem::path socket = client::default_socket();
-  std::filesystem::path recording, output, keep;
+  std::filesystem::path recording, output, keep, background;
   std::vector<float> box_mm;  ///< least x, y, z, then greatest
   bool turntable = false;
   model::LiveOptions live;
@@ -93,13 +96,27 @@ void tell(const std::string& sentence) {
 
 int write_model(const Options& options, const Result<model::Model>& built, const std::string& subject) {
   if (!built) return failed(built.error());
-  const auto format = mesh_format(lower_extension(options.output).substr(1));
-  const auto bytes = write_mesh(built->mesh, *format, "slsd-model of " + subject);
+  const std::string extension = lower_extension(options.output), title = "slsd-model of " + subject;
+  const auto bytes = extension == k3mf ? model::write_3mf(built->mesh, title)
+                                       : write_mesh(built->mesh, *mesh_format(extension.substr(1)), title);
   if (!bytes) return failed(bytes.error());
   if (auto written = write_file_atomically(options.output, *bytes); !written) return failed(written.error());
   const std::string report =
       options.json ? to_json(built->report, built->mesh).dump() + "\n" : to_text(built->report, built->mesh);
   return std::fputs(report.c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
+}
+
+/// @param taker  a ModelBuilder or a LiveSession
+template <class Taker>
+Result<> give_background(const Options& options, Taker& taker) {
+  if (options.background.empty()) return {};
+  constexpr std::size_t kLargestBytes = std::size_t{1} << 31;
+  const auto ply = read_file(options.background, kLargestBytes);
+  if (!ply) return tl::unexpected(ply.error());
+  return taker.set_background(*ply).map_error([&](Error error) {
+    error.where = options.background.string();
+    return error;
+  });
 }
 
 int run_recorded(const Options& options) {
@@ -108,6 +125,7 @@ int run_recorded(const Options& options) {
   for (const std::string& warning : recorded->warnings) tell(warning);
   const auto read = [&recorded](const std::string& name) { return model::read_recorded(*recorded, name); };
   model::ModelBuilder builder(recorded->calibration, options.model);
+  if (auto given = give_background(options, builder); !given) return failed(given.error());
   for (const std::string& name : recorded->names) {
     const auto ply = read(name);
     if (!ply) {
@@ -127,8 +145,9 @@ int run_live(const Options& options) {
   auto clouds = model::LiveClouds::open(
       options.socket, options.keep.empty() ? std::nullopt : std::optional<std::filesystem::path>(options.keep));
   if (!clouds) return failed(clouds.error());
-  Interrupt::watch();
   model::LiveSession session(std::move(*clouds), options.model, options.live, tell);
+  if (auto given = give_background(options, session); !given) return failed(given.error());
+  Interrupt::watch();
   const Result<> ended = session.follow();
   if (!ended) {
     if (session.placed() == 0) return failed(ended.error());
@@ -150,8 +169,8 @@ int run(Options options) {
 
 void check(const Options& options) {
   const std::string extension = lower_extension(options.output);
-  if (extension.empty() || !mesh_format(extension.substr(1)))
-    throw CLI::ValidationError("--output", "the file's name ends in .ply, .stl, .obj or .glb");
+  if (extension != k3mf && (extension.empty() || !mesh_format(extension.substr(1))))
+    throw CLI::ValidationError("--output", "the file's name ends in .ply, .stl, .obj, .glb or .3mf");
   if (options.turntable && options.live.views == 0)
     throw CLI::ValidationError("--turntable", "say how many views a full turn has: --views 24");
   const std::vector<float>& box = options.box_mm;
@@ -169,7 +188,7 @@ int main(int argc, char** argv) {
       "slsd-model");
   Options options;
   app.set_version_flag("--version", "slsd-model " SLSD_VERSION);
-  app.add_option("-o,--output", options.output, "the mesh: .ply, .stl, .obj or .glb");
+  app.add_option("-o,--output", options.output, "the mesh: .ply, .stl, .obj, .glb or .3mf");
   auto* const from =
       app.add_option("--from", options.recording, "the folder of a recording of slsctl that has clouds; else scan now");
   const auto live = [&](CLI::Option* option) { return option->excludes(from); };
@@ -188,6 +207,8 @@ int main(int argc, char** argv) {
   live(app.add_option("--keep", options.keep, "keep the clouds in this new folder, for --from"));
   app.add_option("--box", options.box_mm, "use points in this box alone: least x y z, greatest x y z, mm of the rig")
       ->expected(6);
+  app.add_option("--background", options.background,
+                 "leave out what this dense cloud (PLY) of the scene without the object shows, as table and wall");
   app.add_option("--voxel", options.model.voxel_mm, "the mesh's resolution in mm (by the clouds' pixels and sigmas)")
       ->check(between(0.01, 100.0));
   app.add_flag("--close", options.model.close,

@@ -10,6 +10,8 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import xml.etree.ElementTree
+import zipfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 PACKAGE = HERE.parents[1] / "clients/python"
@@ -56,16 +58,31 @@ def errors(random):
     return sum(w * coarse[place] for w, place in zip(weights, places)) / np.sqrt(sum(w * w for w in weights))
 
 
-def cloud(distance, degrees, seed):
-    """A dense cloud as PLY."""
+def nothing(at):
+    return np.full(len(at), 1000.0)
+
+
+def room(at):
+    """Signed distance to a floor below the object and a tilted wall behind it, in the rig's frame."""
+    tilted = np.array([0.3, 0, -1]) / np.hypot(0.3, 1)
+    return np.minimum(57 - at[:, 1], (at - [0, 0, 665]) @ tilted)
+
+
+def cloud(distance, degrees, seed, behind=nothing):
+    """A dense cloud as PLY.
+
+    behind  signed distance to what does not turn, in the rig's frame
+    """
     v, u = np.mgrid[:HEIGHT, :WIDTH]
     rays = np.stack([(u - (WIDTH - 1) / 2) / FOCUS, (v - (HEIGHT - 1) / 2) / FOCUS, np.ones_like(u)], -1).reshape(-1, 3)
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     far, hit = np.full(len(rays), 520.0), np.zeros(len(rays), bool)
     nearest = rays * (rays @ MIDDLE)[:, None]
-    going = np.flatnonzero(np.linalg.norm(nearest - MIDDLE, axis=1) < 57)
+    near = np.linalg.norm(nearest - MIDDLE, axis=1) < 57
+    going = np.arange(len(rays)) if behind is room else np.flatnonzero(near)
     for _ in range(120):
-        left = distance((rays[going] * far[going, None] - MIDDLE) @ turn(degrees))
+        at = rays[going] * far[going, None]
+        left = np.minimum(np.where(near[going], distance((at - MIDDLE) @ turn(degrees)), np.inf), behind(at))
         far[going] += left
         hit[going[left < 1e-4]] = True
         going = going[(left >= 1e-4) & (far[going] < 700)]
@@ -197,7 +214,7 @@ class Model(unittest.TestCase):
 
     def test_another_program_reads_every_format(self):
         counts = set()
-        for name in ("a.ply", "b.stl", "b.obj", "b.glb"):
+        for name in ("a.ply", "b.stl", "b.obj", "b.glb", "b.3mf"):
             if name != "a.ply":
                 self.assertEqual(run("--from", self.turning, "-o", self.folder / name).returncode, 0)
             done = subprocess.run(("assimp", "info", self.folder / name, "--raw"), capture_output=True, text=True, timeout=300,
@@ -205,6 +222,27 @@ class Model(unittest.TestCase):
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
             counts.add(re.search(r"^Faces: +(\d+)", done.stdout, re.M)[1])
         self.assertEqual(counts, {str(len(self.triangles))})
+
+    def read_3mf(self, *options):
+        """The one object's type, its vertices and triangles, as the standard library reads them."""
+        file = self.folder / "c.3mf"
+        self.assertEqual(run("--from", self.turning, "-o", file, *options).returncode, 0)
+        with zipfile.ZipFile(file) as archive:
+            model = xml.etree.ElementTree.fromstring(archive.read("3D/3dmodel.model"))
+        space = "{http://schemas.microsoft.com/3dmanufacturing/core/2015/02}"
+        self.assertEqual(model.get("unit"), "millimeter")
+        (thing,) = model.iter(space + "object")
+        self.assertEqual([item.get("objectid") for item in model.iter(space + "item")], [thing.get("id")])
+        vertices = [[float(vertex.get(axis)) for axis in "xyz"] for vertex in model.iter(space + "vertex")]
+        triangles = [[int(triangle.get(corner)) for corner in ("v1", "v2", "v3")] for triangle in model.iter(space + "triangle")]
+        return thing.get("type"), np.array(vertices), np.array(triangles)
+
+    def test_3mf_has_the_same_mesh_and_its_kind(self):
+        kind, vertices, triangles = self.read_3mf()
+        self.assertEqual(kind, "surface")  # the poles are open
+        np.testing.assert_array_equal(triangles, self.triangles)
+        np.testing.assert_allclose(vertices, np.stack([self.points[axis] for axis in "xyz"], -1), atol=1e-4)
+        self.assertEqual(self.read_3mf("--close")[0], "model")
 
     def test_frames_that_do_not_fit_are_named_and_left_out(self):
         clouds = self.clouds[:5] + [cloud(smooth_ball, 0, 1), self.clouds[20], self.clouds[5][:-9]] + self.clouds[5:8]
@@ -318,6 +356,39 @@ class Model(unittest.TestCase):
         self.assertGreater(points["y"].min(), -3)
         self.assertLess(abs(points["y"].max() - 50), 8)
 
+    def test_a_background_is_left_out(self):
+        """Floor and wall stand still: most of each cloud. Without them the mesh is as that of the object alone."""
+        steps = range(0, 360, STEP_DEGREES)
+        scene = record(self.folder / "scene", [cloud(bumpy_ball, degrees, degrees, room) for degrees in steps])
+        empty = self.folder / "empty.ply"
+        empty.write_bytes(cloud(nothing, 0, 1000, room))
+        done = run("--from", scene, "-o", self.folder / "of_scene.ply", "--background", empty, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(json.loads(done.stdout)["refused"], [])
+        points, triangles = mesh_ply((self.folder / "of_scene.ply").read_bytes())
+        off = off_truth_mm(points)
+        print(f"with a background: RMS {np.sqrt((off ** 2).mean()):.3f} mm, most {abs(off).max():.2f} mm, {len(triangles)} triangles")
+        self.assertLess(np.sqrt((off ** 2).mean()), 0.07)
+        self.assertLess(abs(off).max(), 0.6)
+        self.assertAlmostEqual(len(triangles) / len(self.triangles), 1, delta=0.05)
+
+    def test_a_background_that_is_none_is_refused(self):
+        broken, other, bare = (self.folder / name for name in ("broken.ply", "other.ply", "bare.ply"))
+        broken.write_bytes(b"ply\n")
+        points = np.frombuffer(self.clouds[0].split(b"end_header\n", 1)[1], "V18").copy()
+        head = self.clouds[0].split(b"end_header\n", 1)[0] + b"end_header\n"
+        fields = np.dtype([("xyz", "<f4", 3), ("sigma", "<f4"), ("intensity", "u1"), ("camera", "u1")])
+        shifted = points.view(fields).copy()
+        shifted["xyz"] *= [1.1, 1, 1]
+        other.write_bytes(head + shifted.tobytes())
+        bare.write_bytes(head.replace(b"vertex %d" % len(points), b"vertex 0"))
+        for file, words in ((broken, "broken.ply"), (other, "other.ply: .*another calibration"), (bare, "bare.ply: .*no points"),
+                            (self.folder / "missing.ply", "missing.ply")):
+            done = run("--from", self.turning, "-o", self.folder / "none.ply", "--background", file)
+            self.assertEqual(done.returncode, 1, file)
+            self.assertRegex(done.stderr, words)
+            self.assertFalse((self.folder / "none.ply").exists())
+
     def test_no_service_and_a_folder_in_use_say_so(self):
         done = run("--socket", self.folder / "none.sock", "-o", self.folder / "none.ply")
         self.assertEqual(done.returncode, 1)
@@ -375,7 +446,7 @@ class Model(unittest.TestCase):
         self.assertEqual(subprocess.run(("assimp", "info", self.folder / "part.stl"), capture_output=True, timeout=300, check=False).returncode, 0)
 
     def test_wrong_usage(self):
-        cases = {("--from", "x"): "--output", ("--from", "x", "-o", "a.txt"): ".ply, .stl, .obj or .glb",
+        cases = {("--from", "x"): "--output", ("--from", "x", "-o", "a.txt"): ".ply, .stl, .obj, .glb or .3mf",
                  ("--from", "x", "-o", "a.ply", "--voxel", "0"): "0.01", ("-o", "a.ply", "--turntable"): "--views",
                  ("-o", "a.ply", "--from", "x", "--until-closed"): "--from",
                  ("-o", "a.ply", "--box", "1", "0", "0", "0", "1", "1"): "the least x, y and z"}

@@ -44,6 +44,7 @@ socket = "slsd.sock"
 SAMPLES = 300_000
 WRONG_PLACE_MM = 1.0
 WALL_MM = 3.0
+OBLIQUE_DEGREES = 75
 BAND_VOXELS = 5.0  # as slsd-model has it
 LARGE_MM, LARGE_VOXEL_MM = 300.0, 0.5
 PROPERTIES = {"float": "<f4", "uchar": "u1", "ushort": "<u2"}
@@ -70,15 +71,19 @@ class Turning:
         u, v = np.rint(in_camera[:, :2] / in_camera[:, 2:] @ self.matrix[:2, :2].T + self.matrix[:2, 2]).astype(int).T
         return np.clip(v, 0, shape[0] - 1), np.clip(u, 0, shape[1] - 1)
 
-    def times_seen(self, places):
-        """In how many frames camera and projector both see these places of the object."""
-        seen = np.zeros(len(places), int)
+    def sights_of(self, places, normals):
+        """In how many frames camera and projector both see these places of the object, and the least angle between the
+        normal and the camera's ray, degrees."""
+        seen, least = np.zeros(len(places), int), np.full(len(places), 180.0)
         for frame, pose in zip(self.frames, self.poses):
             in_camera = places @ pose[:, :3].T + pose[:, 3]
             depth, lit = np.load(frame / "depth.npy"), np.load(frame / "mask.npy")
             at = self.pixels(in_camera, depth.shape)
-            seen += (abs(depth[at] - in_camera[:, 2]) < 1e-3 * in_camera[:, 2]) & (lit[at] > 0)
-        return seen
+            sees = (abs(depth[at] - in_camera[:, 2]) < 1e-3 * in_camera[:, 2]) & (lit[at] > 0)
+            cosines = -(normals @ pose[:, :3].T * in_camera).sum(1) / np.linalg.norm(in_camera, axis=1)
+            seen += sees
+            least = np.where(sees, np.minimum(least, np.degrees(np.arccos(np.clip(cosines, -1, 1)))), least)
+        return seen, least
 
 
 def processor_s(process):
@@ -177,15 +182,17 @@ def score(turning, mesh):
     cloud = mesh.sample_points_uniformly(SAMPLES, use_triangle_normal=True)
     points, normals = np.asarray(cloud.points), np.asarray(cloud.normals)
     off = scene_of(truth).compute_signed_distance(tensor(points)).numpy()
-    places = np.asarray(turning.object.sample_points_uniformly(SAMPLES // 3).points)
-    seen = turning.times_seen(places)
+    sampled = turning.object.sample_points_uniformly(SAMPLES // 3, use_triangle_normal=True)
+    places = np.asarray(sampled.points)
+    seen, least = turning.sights_of(places, np.asarray(sampled.normals))
     first = turning.poses[0]
     in_rig = places @ first[:, :3].T + first[:, 3]
     near = scene_of(mesh).compute_distance(tensor(in_rig)).numpy() < 5e-4 * in_rig[:, 2].mean()
     figures = {"RMS, mm": np.sqrt((off ** 2).mean()), "95 %, mm": np.quantile(abs(off), 0.95), "mean outward, mm": off.mean(),
                "double walls, % of area": 100 * walls(mesh, points, normals),
                "of the visible surface, %": 100 * near[seen > 0].mean(),
-               "of what three clouds see, %": 100 * near[seen > 2].mean()}
+               "of what three clouds see, %": 100 * near[seen > 2].mean(),
+               f"of what one sees at up to {OBLIQUE_DEGREES} degrees, %": 100 * near[least <= OBLIQUE_DEGREES].mean()}
     return figures, move
 
 

@@ -108,12 +108,13 @@ class Model:
         (self._folder / "recording.json").write_text(json.dumps({"scans": self._count}) + "\n", encoding="utf-8")
 
     def save(self, file: str | os.PathLike[str], *, close: bool = False, voxel_mm: float | None = None,
-             box: Sequence[float] | None = None) -> dict[str, Any]:
-        """Writes the mesh to a .ply, .stl, .obj or .glb file, and returns the report.
+             box: Sequence[float] | None = None, background: Cloud | None = None) -> dict[str, Any]:
+        """Writes the mesh to a .ply, .stl, .obj, .glb or .3mf file, and returns the report.
 
-        close     closes all holes, as for printing: invents surface that no cloud measured
-        voxel_mm  the mesh's resolution; None: by the clouds' pixels and sigmas
-        box       uses points in this box alone: x, y and z of its least corner, then of the other, mm
+        close       closes all holes, as for printing: invents surface that no cloud measured
+        voxel_mm    the mesh's resolution; None: by the clouds' pixels and sigmas
+        box         uses points in this box alone: x, y and z of its least corner, then of the other, mm
+        background  leaves out what this dense cloud of the scene without the object shows, as table and wall
 
         Raises ScannerError if the clouds give no mesh; its text says why.
         """
@@ -126,17 +127,21 @@ class Model:
             words += ["--box", *(repr(float(number)) for number in box)]
         if not self._count:
             raise ScannerError("the model has no clouds: add them first")
+        if background is not None:
+            background.save(self._folder / "background.ply")
+            words += ["--background", str(self._folder / "background.ply")]
         done = subprocess.run(words, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise ScannerError(done.stderr.strip().rsplit("\n", 1)[-1] or f"{self._program} ended with {done.returncode}")
         report: dict[str, Any] = json.loads(done.stdout)
         return report
 
-    def mesh(self, *, close: bool = False, voxel_mm: float | None = None, box: Sequence[float] | None = None) -> Mesh:
+    def mesh(self, *, close: bool = False, voxel_mm: float | None = None, box: Sequence[float] | None = None,
+             background: Cloud | None = None) -> Mesh:
         """The mesh as arrays. Parameters and errors are those of `save`."""
         with tempfile.TemporaryDirectory(prefix="slsd-model-") as folder:
             file = pathlib.Path(folder) / "mesh.ply"
-            report = self.save(file, close=close, voxel_mm=voxel_mm, box=box)
+            report = self.save(file, close=close, voxel_mm=voxel_mm, box=box, background=background)
             return _read_mesh(file.read_bytes(), report)
 
 
