@@ -412,6 +412,10 @@ class Model(unittest.TestCase):
             report = model.save(self.folder / "python.stl", close=True, voxel_mm=2, box=[-40, -100, 500, 100, 100, 700])
             self.assertEqual(report["voxel_mm"], 2)
             self.assertGreater(report["invented_share"], 0)
+            with self.assertRaisesRegex(slsd.ScannerError, "no frame can be used: clouds/00000000.ply: it shows almost nothing"):
+                with slsd.Model(calibration(), program=str(PROGRAM)) as other:
+                    other.add(slsd.read_ply(self.clouds[0]))
+                    other.mesh(background=slsd.read_ply(self.clouds[0]))
         again = run("--from", self.folder / "python", "-o", self.folder / "python.ply", "--json")
         self.assertEqual(json.loads(again.stdout), self.report)  # a folder that is kept is a recording
 
