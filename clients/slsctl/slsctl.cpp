@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "clients/slsctl/client_commands.hpp"
 #include "clients/slsctl/client_options.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "clients/usage/datasheet_usage.hpp"
 #include "clients/usage/hand_eye_usage.hpp"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "clients/connection/connection.hpp"
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/web/away.hpp"
 #include "clients/web/boards.hpp"
 #include "core/base64.hpp"

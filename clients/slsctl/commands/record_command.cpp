@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "clients/connection/passing.hpp"
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/recording.hpp"
 #include "clients/slsctl/report.hpp"
 #include "daemon/rpc/message.hpp"

@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include <iostream>
 
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "core/printable.hpp"
 #include "daemon/rpc/message.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 
 #include <iostream>
 

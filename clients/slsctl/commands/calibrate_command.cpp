@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "clients/connection/connection.hpp"
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/report.hpp"
 #include "core/printable.hpp"
 #include "daemon/rpc/message.hpp"

@@ -3,7 +3,7 @@
 #include <iostream>
 #include <string>
 
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/report.hpp"
 #include "daemon/rpc/message.hpp"

@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 #include <ostream>
 
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/progress.hpp"
 #include "clients/slsctl/report.hpp"

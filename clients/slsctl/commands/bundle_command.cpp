@@ -4,7 +4,7 @@
 #include <ostream>
 #include <string>
 
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/report.hpp"
 #include "core/utc_text.hpp"

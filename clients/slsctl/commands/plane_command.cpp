@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/geometry/plane_fit.hpp"

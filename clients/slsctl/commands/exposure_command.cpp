@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/look_at_light.hpp"
 #include "clients/slsctl/report.hpp"
 #include "core/printable.hpp"

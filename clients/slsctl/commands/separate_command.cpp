@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <system_error>
 
-#include "clients/slsctl/client_commands.hpp"
+#include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/report.hpp"
 #include "drivers/system/own_program.hpp"
 
