@@ -29,13 +29,12 @@
 #include "core/decode/decoder.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/exposure/light_levels.hpp"
-#include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"
+#include "tests/corpus/read_with.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr std::size_t kLargestFileBytes = 1 << 24;
 constexpr int kCacheLineBytes = 64;
 
 /// A hardware counter of this thread. Machines without one, many virtual ones among them, give no value.
@@ -157,13 +156,9 @@ void print_differences(const DenseMap& part, const DenseMap& whole) {
 }
 
 Result<> profile(const Request& request) {
-  const auto pattern_text = read_file(request.pattern, kLargestFileBytes);
-  if (!pattern_text) return tl::unexpected(pattern_text.error());
-  const auto pattern = read_pattern(*pattern_text, request.pattern);
+  const auto pattern = read_with(read_pattern, request.pattern);
   if (!pattern) return tl::unexpected(pattern.error());
-  const auto calibration_text = read_file(request.calibration, kLargestFileBytes);
-  if (!calibration_text) return tl::unexpected(calibration_text.error());
-  const auto calibration = read_calibration(*calibration_text, request.calibration);
+  const auto calibration = read_with(read_calibration, request.calibration);
   if (!calibration) return tl::unexpected(calibration.error());
   const auto frame = read_image(request.frame);
   if (!frame) return tl::unexpected(frame.error());

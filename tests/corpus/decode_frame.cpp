@@ -7,20 +7,11 @@
 #include "core/calibration_file/calibration_file.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/decode/decoder.hpp"
-#include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"
+#include "tests/corpus/read_with.hpp"
 
 namespace slsd {
 namespace {
-
-constexpr std::size_t kLargestFileBytes = 1 << 22;
-
-template <class Reader>
-auto read_with(Reader reader, const std::string& path) -> decltype(reader(std::string_view(), path)) {
-  const auto text = read_file(path, kLargestFileBytes);
-  if (!text) return tl::unexpected(text.error());
-  return reader(*text, path);
-}
 
 struct Arguments {
   std::string pattern, calibration, frame, cloud;

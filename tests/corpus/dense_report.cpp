@@ -22,6 +22,7 @@
 #include "tests/corpus/dense_others.hpp"
 #include "tests/corpus/dense_score.hpp"
 #include "tests/corpus/dense_steps.hpp"
+#include "tests/corpus/read_with.hpp"
 
 namespace slsd {
 namespace {
@@ -39,7 +40,6 @@ struct Clock {
     return time_point(std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec));
   }
 };
-constexpr std::size_t kLargestFileBytes = 1 << 22;
 
 double ms_since(Clock::time_point begin) {
   return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
@@ -91,9 +91,7 @@ struct Steps {
 
 Result<> report(const Pattern& pattern, const std::string& folder, const DenseOptions& options, double offset_px,
                 bool compare, const Steps& steps, const std::string& clouds) {
-  const auto text = read_file(folder + "/calibration.yml", kLargestFileBytes);
-  if (!text) return tl::unexpected(text.error());
-  auto calibration = read_calibration(*text, folder + "/calibration.yml");
+  auto calibration = read_with(read_calibration, folder + "/calibration.yml");
   if (!calibration) return tl::unexpected(calibration.error());
   const Calibration true_calibration = *calibration;
   move_across(*calibration, offset_px);
@@ -192,8 +190,7 @@ int main(int argc, char** argv) {
         stderr);
     return 2;
   }
-  const auto text = read_file(pattern_file, kLargestFileBytes);
-  const auto pattern = text ? read_pattern(*text, pattern_file) : Result<Pattern>(tl::unexpected(text.error()));
+  const auto pattern = read_with(read_pattern, pattern_file);
   if (!pattern) return std::fprintf(stderr, "dense-report: %s\n", to_string(pattern.error()).c_str()), 1;
   std::printf(
       "scene                    seeds compl med px rms px  mm med rms  gross unlit   far  err/s  >3   edges 0-2 2-4 "

@@ -5,28 +5,18 @@
 
 #include <filesystem>
 
-#include "drivers/files/file.hpp"
 #include "drivers/files/read_image.hpp"
+#include "tests/corpus/read_with.hpp"
 
 namespace slsd {
 
 namespace {
 
-constexpr std::size_t kLargestFileBytes = 1 << 22;
 constexpr double kBaselineMm = 180, kPlaneMm = 2000, kFocalPx = 2500;
 
 const std::filesystem::path& root() {
   static const std::filesystem::path path = SLSD_SOURCE_DIR;
   return path;
-}
-
-/// Reads a text file and makes something of it with one of the readers.
-template <class Reader>
-auto read_with(Reader reader, const std::filesystem::path& path)
-    -> decltype(reader(std::string_view(), path.native())) {
-  const auto text = read_file(path, kLargestFileBytes);
-  if (!text) return tl::unexpected(text.error());
-  return reader(*text, path.native());
 }
 
 Calibration calibration_of_pattern(const Pattern& pattern) {
