@@ -9,8 +9,8 @@
 
 #include <fmt/format.h>
 
-#include "clients/model/tidy_mesh.hpp"
-#include "clients/model/volume.hpp"
+#include "clients/model/mesh/tidy_mesh.hpp"
+#include "clients/model/mesh/volume.hpp"
 #include "core/cloud/read_dense_ply.hpp"
 #include "core/geometry/robust.hpp"
 

@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "clients/model/adjust.hpp"
 #include "clients/model/background.hpp"
+#include "clients/model/places/adjust.hpp"
+#include "clients/model/places/seen_sides.hpp"
+#include "clients/model/places/track.hpp"
 #include "clients/model/range_image.hpp"
-#include "clients/model/seen_sides.hpp"
-#include "clients/model/track.hpp"
 #include "core/mesh/mesh.hpp"
 #include "core/result.hpp"
 

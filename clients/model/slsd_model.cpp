@@ -14,7 +14,7 @@
 
 #include "clients/model/build_model.hpp"
 #include "clients/model/live_session.hpp"
-#include "clients/model/mesh_3mf.hpp"
+#include "clients/model/mesh/mesh_3mf.hpp"
 #include "clients/model/recorded_clouds.hpp"
 #include "clients/usage/usage.hpp"
 #include "core/mesh/mesh_file.hpp"

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "bumpy_ball.hpp"
-#include "clients/model/adjust.hpp"
+#include "clients/model/places/adjust.hpp"
 
 namespace slsd::model {
 namespace {

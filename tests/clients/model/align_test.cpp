@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 
 #include "bumpy_ball.hpp"
-#include "clients/model/align.hpp"
-#include "clients/model/track.hpp"
+#include "clients/model/places/align.hpp"
+#include "clients/model/places/track.hpp"
 
 namespace slsd::model {
 namespace {

@@ -11,8 +11,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "clients/model/places/surface_cells.hpp"
 #include "clients/model/range_image.hpp"
-#include "clients/model/surface_cells.hpp"
 
 namespace slsd::model {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 
-#include "clients/model/seen_sides.hpp"
+#include "clients/model/places/seen_sides.hpp"
 
 #include <cmath>
 #include <numbers>

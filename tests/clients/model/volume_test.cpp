@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 
 #include "bumpy_ball.hpp"
-#include "clients/model/tidy_mesh.hpp"
-#include "clients/model/volume.hpp"
+#include "clients/model/mesh/tidy_mesh.hpp"
+#include "clients/model/mesh/volume.hpp"
 
 namespace slsd::model {
 namespace {

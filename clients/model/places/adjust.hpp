@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "clients/model/track.hpp"
+#include "clients/model/places/track.hpp"
 
 namespace slsd::model {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/surface_cells.hpp"
+#include "clients/model/places/surface_cells.hpp"
 
 #include <algorithm>
 #include <cmath>

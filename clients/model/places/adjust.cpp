@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/adjust.hpp"
+#include "clients/model/places/adjust.hpp"
 
 #include <algorithm>
 #include <array>

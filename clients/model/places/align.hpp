@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "clients/model/surface_cells.hpp"
+#include "clients/model/places/surface_cells.hpp"
 #include "core/geometry/calibration.hpp"
 
 namespace slsd::model {

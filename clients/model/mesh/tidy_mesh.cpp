@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/tidy_mesh.hpp"
+#include "clients/model/mesh/tidy_mesh.hpp"
 
 #include <algorithm>
 #include <cstddef>

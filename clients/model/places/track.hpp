@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "clients/model/align.hpp"
+#include "clients/model/places/align.hpp"
 
 namespace slsd::model {
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/harmonic_grid.hpp"
+#include "clients/model/mesh/harmonic_grid.hpp"
 
 #include <algorithm>
 #include <array>

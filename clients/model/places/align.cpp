@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/align.hpp"
+#include "clients/model/places/align.hpp"
 
 #include <algorithm>
 #include <array>

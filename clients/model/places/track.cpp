@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/track.hpp"
+#include "clients/model/places/track.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/close_field.hpp"
+#include "clients/model/mesh/close_field.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <openvdb/tools/SignedFloodFill.h>
 
-#include "clients/model/harmonic_grid.hpp"
+#include "clients/model/mesh/harmonic_grid.hpp"
 
 namespace slsd::model {
 namespace {

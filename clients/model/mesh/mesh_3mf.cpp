@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/mesh_3mf.hpp"
+#include "clients/model/mesh/mesh_3mf.hpp"
 
 #include <Model/COM/NMR_DLLInterfaces.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/model/volume.hpp"
+#include "clients/model/mesh/volume.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,7 +14,7 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/Geometry>
 
-#include "clients/model/close_field.hpp"
+#include "clients/model/mesh/close_field.hpp"
 
 namespace slsd::model {
 namespace {
