@@ -181,6 +181,38 @@ inline __attribute__((always_inline)) void sum_columns(const float* evidence, st
   }
 }
 
+/// sum_lanes() without the sides, four pixels at once.
+/// @param sums  buffer for 6 (side + 4) numbers
+inline __attribute__((always_inline)) void sum_enclosed(const Summing& in, const float* evidence, float* sums,
+                                                        float* least, float* own) {
+  constexpr int kTogether = kLanes / 2;
+  const int side = in.side, reach = in.reach, pitch = (2 * side + kLanes - 1) / kLanes * kLanes;
+  const auto take_lower = [](const Lanes& a, Lanes& to) __attribute__((always_inline)) {
+    to = a < to ? a : to;
+  };
+  for (int y = 0; y < in.cell; ++y) {
+    const float* const rows = evidence + 2 * static_cast<std::ptrdiff_t>(y) * side;
+    sum_columns(rows, 2 * static_cast<std::ptrdiff_t>(side), reach, pitch, sums);
+    for (int x = 0; x < in.cell; x += kTogether) {
+      const float *const whole = sums + 2 * x, *const upper = whole + pitch, *const lower = upper + pitch;
+      Lanes left{}, right{}, above{}, below{}, more;
+      for (int k = 0; k < reach; ++k) load(whole + 2 * k, more), left += more;
+      for (int k = reach + 1; k <= 2 * reach; ++k) load(whole + 2 * k, more), right += more;
+      for (int k = 0; k <= 2 * reach; ++k) load(upper + 2 * k, more), above += more;
+      for (int k = 0; k <= 2 * reach; ++k) load(lower + 2 * k, more), below += more;
+      load(whole + 2 * reach, more);
+      Lanes most = left + more + right;
+      left += more, right += more;
+      take_lower(left, right), take_lower(above, right), take_lower(below, right);
+      take_lower(right + in.of_half, most);
+      take_lower(__builtin_shufflevector(most, most, 1, 0, 3, 2, 5, 4, 7, 6), most);
+      const float* const here = evidence + 2 * ((y + reach) * side + x + reach);
+      for (int i = 0; i < kTogether && x + i < in.cell; ++i)
+        least[y * in.cell + x + i] = most[2 * i], own[y * in.cell + x + i] = here[2 * i + 1];
+    }
+  }
+}
+
 /// Finds the least evidence around each pixel of a cell: of the whole surroundings, and of the half on each side. The
 /// pixel's own line is in both halves. A surface that continues on one side alone ends here, or earlier.
 /// @param evidence  two numbers for each of side x side pixels, and some more
@@ -190,6 +222,7 @@ inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const fl
                                                      float* least, float* own, SideEvidence* sides) {
   const int side = in.side, reach = in.reach, pitch = (2 * side + kLanes - 1) / kLanes * kLanes;
   float* const sums = buffer + 8 * static_cast<std::ptrdiff_t>(side + 1);
+  if (sides == nullptr) return sum_enclosed(in, evidence, sums, least, own);
   for (int y = 0; y < in.cell; ++y) {
     const float* const rows = evidence + 2 * static_cast<std::ptrdiff_t>(y) * side;
     sum_columns(rows, 2 * static_cast<std::ptrdiff_t>(side), reach, pitch, sums);
@@ -212,8 +245,7 @@ inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const fl
       least[y * in.cell + x] = std::min(whole, halves + in.of_half);
       const float* const here = evidence + 2 * ((y + reach) * side + x + reach);
       own[y * in.cell + x] = here[1];
-      if (sides != nullptr)
-        split_sides({all, left, right, behind - before}, {here[0], here[1]}, sides[y * in.cell + x]);
+      split_sides({all, left, right, behind - before}, {here[0], here[1]}, sides[y * in.cell + x]);
     }
   }
 }

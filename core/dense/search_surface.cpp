@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include "core/clones.hpp"
@@ -142,23 +143,27 @@ bool SurfaceSearch::read_window(const DenseFrame& frame, const SurfaceGrid& grid
   const int half = window_px_ / 2;
   if (place.x() < half || place.y() < half || place.x() + half >= width || place.y() + half >= height) return false;
   scratch.levels.resize(xs_.size());
-  float sum = 0, pixels = 0;
   std::visit(
       [&](const auto& image) {
         const auto* const middle = image.row(place.y()) + place.x();
         const auto stride = static_cast<std::ptrdiff_t>(image.stride);
-        for (std::size_t i = 0; i < xs_.size(); ++i) {
-          const auto level = static_cast<float>(middle[static_cast<int>(ys_[i]) * stride + static_cast<int>(xs_[i])]);
-          scratch.levels[i] = level, sum += weights_[i] * level, pixels += weights_[i];
-        }
+        for (std::size_t i = 0; i < xs_.size(); ++i)
+          scratch.levels[i] = static_cast<float>(middle[static_cast<int>(ys_[i]) * stride + static_cast<int>(xs_[i])]);
       },
       frame.pixels);
-  const float mean = sum / pixels;
-  scratch.pixels = pixels, scratch.squares = 0;
-  for (std::size_t i = 0; i < xs_.size(); ++i) {
-    scratch.levels[i] = weights_[i] * (scratch.levels[i] - mean);
-    scratch.squares += scratch.levels[i] * scratch.levels[i];
+  Lanes sum{}, count{}, squares{}, level, weight;
+  for (std::size_t i = 0; i < xs_.size(); i += kLanes) {
+    load(scratch.levels.data() + i, level), load(weights_.data() + i, weight);
+    sum += weight * level, count += weight;
   }
+  const float pixels = sum_of(count);
+  const float mean = sum_of(sum) / pixels;
+  for (std::size_t i = 0; i < xs_.size(); i += kLanes) {
+    load(scratch.levels.data() + i, level), load(weights_.data() + i, weight);
+    level = weight * (level - mean), squares += level * level;
+    std::memcpy(scratch.levels.data() + i, &level, sizeof level);
+  }
+  scratch.pixels = pixels, scratch.squares = sum_of(squares);
   const float noise = kNoiseMultipleMin * frame.noise.at(mean);
   return scratch.squares >= noise * noise * pixels;
 }

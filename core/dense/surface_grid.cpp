@@ -328,6 +328,11 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field
                         in_part = std::min(kBatchNodes, front_.size() - first);
       Batch& batch = batches_[worker];
       std::size_t active = 0;
+      // A front's nodes lie far apart in memory.
+      for (std::size_t i = 0; i < in_part; ++i) {
+        const std::int32_t node = front_[first + i].node;
+        __builtin_prefetch(&turned_[node]), __builtin_prefetch(&nodes_[node], 1);
+      }
       for (std::size_t i = 0; i < in_part; ++i) {
         PatchTask& task = batch.tasks[i];
         task.settled = front_[first + i].gain > 0;
@@ -339,7 +344,16 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field
         accepted_[first + i] = accept(batch.tasks[i], nodes_[front_[first + i].node]);
     });
     for (const Attempt& attempt : front_) pending_[attempt.node] = -1;
+    constexpr std::size_t kAhead = 8;
+    const auto last = static_cast<std::int32_t>(nodes_.size()) - 1;
+    const auto fetch_around = [&](std::int32_t node) {
+      for (const std::int32_t by : {step, -step, step * columns_, -step * columns_}) {
+        const std::int32_t other = std::clamp(node + by, 0, last);
+        __builtin_prefetch(&nodes_[other]), __builtin_prefetch(&pending_[other], 1);
+      }
+    };
     for (std::size_t i = 0; i < front_.size(); ++i) {
+      if (i + kAhead < front_.size() && accepted_[i + kAhead]) fetch_around(front_[i + kAhead].node);
       if (accepted_[i]) offer_neighbours(front_[i].node, step);
     }
   }

@@ -69,13 +69,16 @@ CellProposer::Proposal CellProposer::continued(const Frame& frame, std::int32_t 
   return {};
 }
 
+/// Additional distance from its line that a node may have.
+double CellProposer::off_line_px(const Frame& frame, std::int32_t node) {
+  return frame.shapes[static_cast<std::size_t>(node)].is_well_seen() ? 0 : kOffLineShare * frame.gate.pitch_px();
+}
+
 CellProposer::Proposal CellProposer::best_on_line(const Frame& frame, std::int32_t node) const {
-  const double off_line_px =
-      frame.shapes[static_cast<std::size_t>(node)].is_well_seen() ? 0 : kOffLineShare * frame.gate.pitch_px();
   std::int32_t best = -1;
   float most = 0;
   const WindowEvidence window = evidence_around(node);
-  frame.gate.visit_along(node, off_line_px, [&](int row, int column) {
+  frame.gate.visit_along(node, off_line_px(frame, node), [&](int row, int column) {
     const std::int32_t cell = grid_.at(row, column);
     if (const float nats = window_nats(window, cell); nats > most) best = cell, most = nats;
   });
@@ -100,9 +103,13 @@ void CellProposer::propose_range(const Frame& frame, std::int32_t first, std::in
   for (std::int32_t node = first; node < last; ++node) {
     Proposal& proposal = proposals_[static_cast<std::size_t>(node)] = continued(frame, node, first);
     if (proposal.certain) continue;
-    if (frame.gate.knows_lines()) proposal = best_on_line(frame, node);
-    if (proposal.certain) continue;
-    if (const Proposal anywhere = looked_up(frame, node); anywhere.certain) proposal = anywhere;
+    // No cell on the line supports a completely read window more than the one that it looks up, which costs less.
+    const Proposal anywhere = looked_up(frame, node);
+    const bool is_on_line =
+        anywhere.certain &&
+        frame.gate.admits(node, grid_.row_of(anywhere.cell), grid_.column_of(anywhere.cell), off_line_px(frame, node));
+    if (!is_on_line && frame.gate.knows_lines()) proposal = best_on_line(frame, node);
+    if (!proposal.certain && anywhere.certain) proposal = anywhere;
   }
 }
 
@@ -113,14 +120,13 @@ void CellProposer::carry_on(const Frame& frame) {
     if (proposals_[i].certain) continue;
     const auto node = static_cast<std::int32_t>(i);
     const bool is_degraded = !frame.shapes[i].is_well_seen();  // its centroid may be displaced, and break its links
-    const double off_line_px = is_degraded ? kOffLineShare * frame.gate.pitch_px() : 0;
     for (const Direction d : kDirections) {
       const std::int32_t other = is_degraded ? frame.nodes[i].links[d] : frame.beside[i][d];
       if (other < 0) continue;
       const Proposal& from = proposals_[static_cast<std::size_t>(other)];
       const std::int32_t cell = grid_.beyond(from.cell, opposite(d));
       if (cell < 0 || cell == next_[i].cell) continue;
-      if (!frame.gate.admits(node, grid_.row_of(cell), grid_.column_of(cell), off_line_px)) continue;
+      if (!frame.gate.admits(node, grid_.row_of(cell), grid_.column_of(cell), off_line_px(frame, node))) continue;
       Proposal there = weigh(node, cell);
       if (is_degraded && from.certain) there.nats += kBesideCertain;
       if (next_[i].cell < 0 || there.nats > next_[i].nats) next_[i] = there;

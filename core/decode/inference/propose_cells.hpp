@@ -49,6 +49,7 @@ class CellProposer {
   [[nodiscard]] float window_nats(const WindowEvidence& window, std::int32_t cell) const;
   [[nodiscard]] Proposal weigh(std::int32_t node, std::int32_t cell) const;
   [[nodiscard]] Proposal continued(const Frame& frame, std::int32_t node, std::int32_t first) const;
+  [[nodiscard]] static double off_line_px(const Frame& frame, std::int32_t node);
   [[nodiscard]] Proposal best_on_line(const Frame& frame, std::int32_t node) const;
   [[nodiscard]] Proposal looked_up(const Frame& frame, std::int32_t node) const;
   void propose_range(const Frame& frame, std::int32_t first, std::int32_t last);
