@@ -14,10 +14,10 @@ import numpy as np
 
 from browser import Browser, is_there
 from impostor import Impostor, result
-from page_service import Web
+from page_service import Web, downloaded
 from path_proxy import PathProxy
 from point_cloud import vertices
-from service import Service, slsctl, wait_until
+from service import Service, slsctl
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 READY = "document.getElementById('state').textContent === 'Ready to scan.'"
@@ -234,9 +234,7 @@ class Adversity(unittest.TestCase):
                 name = browser.run("return shownScan.scan;")
                 for extension in ("ply", "pcd"):
                     browser.click(f"#save-{extension}")
-                files = [pathlib.Path(downloads, f"{name}.{extension}") for extension in ("ply", "pcd")]
-                wait_until(lambda: all(file.exists() for file in files), "two files")
-                ply, pcd = (file.read_bytes() for file in files)
+                pcd, ply = (file.read_bytes() for file in downloaded(downloads, f"{name}.p??", 2))
                 self.assertEqual(len(vertices(ply)), browser.run("return view.ply.count;"))
                 # A frame that is played back gives the same points: what the service itself writes is the same but for names.
                 for kind, saved in (("ply", ply), ("pcd", pcd)):

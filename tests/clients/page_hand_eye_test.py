@@ -17,11 +17,11 @@ import numpy
 
 from browser import Browser, is_there
 from impostor import Impostor
-from page_service import Web, name_of
+from page_service import Web, downloaded, name_of
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 import hand_eye_test as robot
-from service import BIN, TIMEOUT_S, Service, wait_until
+from service import BIN, TIMEOUT_S, Service
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 LOOKS = 8
@@ -137,8 +137,7 @@ class Operator(HandEye):
             self.picture(browser, "light", 1600)
             self.check_place(self.looks / "hand_eye.yml")
             browser.click("#hand-eye-save")
-            wait_until(lambda: list(pathlib.Path(downloads).glob("*.yml")), "no file")
-            self.assertEqual(next(pathlib.Path(downloads).glob("*.yml")).read_bytes(), (self.looks / "hand_eye.yml").read_bytes())
+            self.assertEqual(downloaded(downloads, "*.yml")[0].read_bytes(), (self.looks / "hand_eye.yml").read_bytes())
             self.check_same_as_the_command(service)
             self.put_into_force(browser, service)
             self.assertEqual([told for told in browser.complaints() if not re.search("50[23]", told)], [])  # while it was started again

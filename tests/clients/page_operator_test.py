@@ -9,7 +9,7 @@ import tempfile
 import unittest
 
 from browser import Browser, is_there
-from page_service import Web
+from page_service import Web, downloaded
 from gige_double import Double, service_on
 from service import Service, wait_until
 
@@ -76,7 +76,7 @@ class Operator(unittest.TestCase):
             browser.click_at("#space", x, y)
         browser.wait("/mm ±/.test(document.getElementById('distance').textContent)", "no distance")
         browser.click("#save-ply")
-        wait_until(lambda: list(pathlib.Path(downloads).glob("*.ply")), "a file")
+        downloaded(downloads, "*.ply")
 
     def test_sliders_set_exposure_and_gain_and_follow_what_is_in_force(self):
         double = Double()
@@ -192,8 +192,7 @@ class Operator(unittest.TestCase):
             self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390)
             browser.picture(self.folder / "boards-390.png")
             browser.click("#board-list li button")
-            wait_until(lambda: list(pathlib.Path(downloads).glob("*.pdf")), "a PDF")
-            self.assertEqual(next(pathlib.Path(downloads).glob("*.pdf")).read_bytes(), files[0].read_bytes())
+            self.assertEqual(downloaded(downloads, "*.pdf")[0].read_bytes(), files[0].read_bytes())
             browser.click("#board-list li button:last-child")
             self.assertEqual(browser.run("return document.getElementById('board').value;"), "charuco:11x7:23:17.25:DICT_5X5_1000")
             self.assertEqual(browser.complaints(), [])

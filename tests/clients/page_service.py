@@ -13,7 +13,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
-from service import BIN, TIMEOUT_S
+from service import BIN, TIMEOUT_S, wait_until
 
 TOKEN = "correct horse battery staple"
 
@@ -86,6 +86,14 @@ class Web:
             except ConnectionError:
                 pass
             return answer
+
+
+def downloaded(folder, pattern, count=1):
+    """The files that a browser saved, once they are whole: it keeps the place of each with an empty one."""
+    def whole():
+        return sorted(file for file in pathlib.Path(folder).glob(pattern) if file.stat().st_size > 0)
+    wait_until(lambda: len(whole()) == count, f"{count} of {pattern}")
+    return whole()
 
 
 def name_of(answer):

@@ -11,7 +11,7 @@ import time
 import unittest
 
 from browser import Browser, is_there
-from page_service import TOKEN, Web, resident_mib
+from page_service import TOKEN, Web, downloaded, resident_mib
 from calibrate_test import BOARD, stage
 from clipped_frame import write_clipped
 from gige_double import Double, service_on
@@ -111,8 +111,7 @@ class Views(unittest.TestCase):
                 self.assertLess(low, high, colour)
             for extension in ("ply", "pcd"):
                 browser.click(f"#save-{extension}")
-            wait_until(lambda: len(list(pathlib.Path(downloads).glob("*.p??"))) == 2, "two files")
-            ply = next(pathlib.Path(downloads).glob("*.ply")).read_bytes()
+            ply = downloaded(downloads, "*.p??", 2)[1].read_bytes()
             self.assertEqual(len(vertices(ply)), points)
             browser.click("[data-project=focus]")
             browser.wait("/shows held/.test(document.getElementById('device-list').textContent)", "no chart")
