@@ -72,7 +72,7 @@ class CellGate {
     double across = -first * per_slope;
     for (int along = 0; along <= last_along;) {
       // Predict from the previous cell: lens distortion bends the line only gradually. Numbers are rounded by casts.
-      const int before = static_cast<int>(std::clamp<double>(across, 0, last_across) + 0.5);
+      const int before = static_cast<int>(std::clamp<double>(across, 0, last_across) + 1.5) - 1;
       across = before - segment.residual_px(direction(along, before)) * per_slope;
       const int nearest = static_cast<int>(std::clamp<double>(across, -1, last_across + 1) + 1.5) - 1;
       const Eigen::Vector2d& there = direction(along, std::clamp(nearest, 0, last_across));
