@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "core/appearance/patch_map.hpp"
+#include "core/appearance/pattern_field.hpp"
 #include "core/decode/grid/lattice_frame.hpp"
 #include "core/dense/ray_grid.hpp"
 #include "core/geometry/ray_table.hpp"
