@@ -258,8 +258,12 @@ double GridFollower::still_share(const DenseFrame& frame, const SurfaceGrid& gri
             const SurfaceNode* node = grid.good(column, row);
             if (node == nullptr || good++ % kSampled != 0) continue;
             float squares = 0;
-            for (int y = grid.y_of(row) - half; y <= grid.y_of(row) + half; ++y) {
-              for (int x = grid.x_of(column) - half; x <= grid.x_of(column) + half; ++x) {
+            // A window at the border of the frame is seen in part.
+            const int left = std::max(0, grid.x_of(column) - half), top = std::max(0, grid.y_of(row) - half);
+            const int right = std::min(pixels.width, grid.x_of(column) + half + 1),
+                      bottom = std::min(pixels.height, grid.y_of(row) + half + 1);
+            for (int y = top; y < bottom; ++y) {
+              for (int x = left; x < right; ++x) {
                 const float off = static_cast<float>(pixels.at(x, y)) -
                                   static_cast<float>(last_[static_cast<std::size_t>(y) * pixels.width + x]);
                 squares += off * off;
@@ -267,7 +271,7 @@ double GridFollower::still_share(const DenseFrame& frame, const SurfaceGrid& gri
             }
             const float noise = frame.noise.at(node->offset + 0.5F * node->gain);
             ++looked_at;
-            still += squares <= 2 * kStill * noise * noise * static_cast<float>(window_px_ * window_px_);
+            still += squares <= 2 * kStill * noise * noise * static_cast<float>((right - left) * (bottom - top));
           }
         }
       },
