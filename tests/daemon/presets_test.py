@@ -3,14 +3,20 @@
 # Copyright the slsd authors
 """Presets: saved by name, in force within one scan, kept beside the settings; what cannot be used changes nothing."""
 import json
+import os
 import pathlib
 import tempfile
 import threading
-import time
 import unittest
 
 from client import RpcError
 from service import SCENE, Service, slsctl
+
+
+def processor_s(process):
+    """Processor time of a process so far."""
+    fields = pathlib.Path(f"/proc/{process.pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 class Presets(unittest.TestCase):
@@ -45,15 +51,15 @@ class Presets(unittest.TestCase):
         self.assertEqual(self.call("settings")["set"], {"decode": {"depth_max_mm": 600.0}})
 
     def test_cost_one_scan_no_second_one(self):
-        """A scan that changes the preset takes little more than one that does not."""
+        """A scan that changes the preset makes the decoder anew, and no second scan. Processor time, as others may use the machine."""
         self.save_two()
         self.call("scan", preset="near")
-        begin = time.monotonic()
+        begin = processor_s(self.service.process)
         for name in ("far", "near") * 3:
             before = self.call("status")["scans"]["succeeded"]
             self.call("scan", preset=name)
             self.assertEqual(self.call("status")["scans"]["succeeded"], before + 1)
-        self.assertLess((time.monotonic() - begin) / 6, 60)
+        self.assertLess((processor_s(self.service.process) - begin) / 6, 5)
 
     def test_survive_a_restart(self):
         self.save_two()
