@@ -21,7 +21,7 @@ class Background {
 
   /// Removes the pixels that see the background, and crops the images to the rest. A pixel sees it if its depth is that
   /// of the background within four sigmas of their difference, or greater. At the background's own edges a pixel sees
-  /// now this surface, now that, so the pixels beside it count, too.
+  /// now this surface, now that, so the nearest of the pixels beside it counts.
   void remove_from(std::vector<RangeImage>& images) const;
 
  private:
