@@ -124,7 +124,7 @@ inline Measured measure_by(const DenseOptions& options, const GreyView& frame) {
   return measure(frame, mapper);
 }
 
-/// What was measured nearer than that.
+/// Points that were measured nearer than that.
 inline DenseMap nearer_than(float depth_mm, DenseMap map) {
   for (std::size_t pixel = 0; pixel < map.pixels.size(); ++pixel)
     if (map.measured(pixel) && map.depth_mm[pixel] > depth_mm) map.drop(pixel, DensePixel::kNotReached);
