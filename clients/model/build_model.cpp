@@ -110,15 +110,15 @@ SeenSides ModelBuilder::sides() const {
   return seen_sides(places, middle / static_cast<double>(std::max<std::size_t>(1, places.size())));
 }
 
-bool ModelBuilder::closed() const {
+bool ModelBuilder::closed(const SeenSides& sides) const {
   const std::vector<ModelFrame>& frames = tracker_.frames();
-  if (frames.empty() || !sides().all()) return false;
+  if (frames.empty() || !sides.all()) return false;
   for (std::size_t early = 0; early + 1 < frames.size(); ++early)
     if (came_round(frames, early, frames.size() - 1)) return true;
   return false;
 }
 
-Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell) {
+Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell, const Advance& advance) {
   Model model{{}, std::move(report_)};
   ModelReport& report = model.report;
   std::vector<ModelFrame>& frames = tracker_.frames();
@@ -126,11 +126,13 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell) {
     return fail(ErrorCode::kMalformed, report.refused.empty() ? "no cloud came"
                                                               : "no frame can be used: " + report.refused.front().name +
                                                                     ": " + report.refused.front().reason);
+  if (advance) advance(0, 0);
   report.adjustment = adjust(frames);
   report.turned_degrees = way_degrees(frames);
   report.voxel_mm = options_.voxel_mm.value_or(voxel_mm_);
   Volume volume({.voxel_mm = report.voxel_mm, .band_mm = 5 * report.voxel_mm});
   for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (advance) advance(i, frames.size());
     const std::string& name = names_[frames[i].number];
     const std::optional<double>& fit = report.adjustment.fit[i];
     if (!fit || *fit > kGreatestFitAdjusted) {
@@ -146,6 +148,7 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell) {
     volume.add(*shot, frames[i].object_from_rig);
     report.fused.push_back({name, frames[i].object_from_rig, *fit});
   }
+  if (advance) advance(frames.size(), frames.size());
   model.mesh = tidy(options_.close ? volume.closed_mesh() : volume.mesh(), kSmallestPiece);
   if (model.mesh.triangles.empty())
     return fail(

@@ -59,6 +59,9 @@ struct Model {
 /// Tells of progress: a sentence for the user.
 using Tell = std::function<void(const std::string&)>;
 
+/// Tells how many of the clouds are fused; 0 of 0 while their places are adjusted.
+using Advance = std::function<void(std::size_t done, std::size_t clouds)>;
+
 /// Tracks an object through clouds, adjusts all places at once and fuses the clouds into a mesh in the frame of the rig
 /// at the first cloud. Needs each cloud twice, so that memory holds the surface alone.
 /// @thread thread-bound
@@ -86,13 +89,16 @@ class ModelBuilder {
 
   /// The sides from which the object was seen so far.
   [[nodiscard]] SeenSides sides() const;
-  /// Tells whether the object was seen from all sides, and the end meets the beginning.
-  [[nodiscard]] bool closed() const;
+  /// Tells whether the object was seen from all sides, and the end meets the beginning. @param sides  as of sides()
+  [[nodiscard]] bool closed(const SeenSides& sides) const;
   [[nodiscard]] std::size_t placed() const { return tracker_.frames().size(); }
+  /// The clouds that were placed, in order.
+  [[nodiscard]] const std::vector<ModelFrame>& frames() const { return tracker_.frames(); }
 
   /// Builds the mesh. Ends this object's work.
+  /// @param advance  may be empty
   /// @errors kMalformed: no cloud can be used, or no two show the same place; of `read`
-  [[nodiscard]] Result<Model> finish(const Read& read, const Tell& tell);
+  [[nodiscard]] Result<Model> finish(const Read& read, const Tell& tell, const Advance& advance = {});
 
  private:
   [[nodiscard]] Result<Shot> read_shot(std::string_view ply) const;

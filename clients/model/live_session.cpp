@@ -30,8 +30,13 @@ bool wait_for_line() {
 
 }  // namespace
 
-LiveSession::LiveSession(LiveClouds clouds, const ModelOptions& model, const LiveOptions& options, Tell tell)
-    : clouds_(std::move(clouds)), builder_(clouds_.calibration(), model), options_(options), tell_(std::move(tell)) {}
+LiveSession::LiveSession(LiveClouds clouds, const ModelOptions& model, const LiveOptions& options, Tell tell,
+                         OnCloud on_cloud)
+    : clouds_(std::move(clouds)),
+      builder_(clouds_.calibration(), model),
+      options_(options),
+      tell_(std::move(tell)),
+      on_cloud_(std::move(on_cloud)) {}
 
 Result<> LiveSession::follow() {
   Result<> ended = options_.views > 0 ? follow_turntable() : follow_object();
@@ -40,15 +45,15 @@ Result<> LiveSession::follow() {
   return clouds_.finish();
 }
 
-Result<Model> LiveSession::finish() {
-  return builder_.finish([this](const std::string& name) { return clouds_.read(name); }, tell_);
+Result<Model> LiveSession::finish(const Advance& advance) {
+  return builder_.finish([this](const std::string& name) { return clouds_.read(name); }, tell_, advance);
 }
 
-bool LiveSession::enough() const {
+bool LiveSession::enough(const SeenSides& sides) const {
   if (Interrupt::came()) return true;
   if (options_.seconds && std::chrono::duration<double>(Clock::now() - begin_).count() >= *options_.seconds)
     return true;
-  return options_.until_closed && builder_.closed();
+  return options_.until_closed && builder_.closed(sides);
 }
 
 Result<> LiveSession::follow_object() {
@@ -59,9 +64,10 @@ Result<> LiveSession::follow_object() {
     if (!ply) return tl::unexpected(ply.error());
     // The service takes the next cloud while this one is placed.
     if (auto asked = clouds_.request(); !asked) return asked;
-    if (auto added = add(*ply); !added) return added;
-    show_progress();
-    if (!enough()) continue;
+    const auto sides = add(*ply);
+    if (!sides) return tl::unexpected(sides.error());
+    show_progress(*sides);
+    if (!enough(*sides)) continue;
     (void)clouds_.receive();
     return {};
   }
@@ -86,14 +92,14 @@ Result<> LiveSession::scan_view(int view) {
     if (auto asked = clouds_.request(); !asked) return asked;
     const auto ply = clouds_.receive();
     if (!ply) return tl::unexpected(ply.error());
-    if (auto added = add(*ply); !added) return added;
+    if (auto sides = add(*ply); !sides) return tl::unexpected(sides.error());
     if (builder_.placed() == before)
       say(fmt::format("view {} of {} was not placed: press Enter to scan it again", view, options_.views));
   }
   return {};
 }
 
-Result<> LiveSession::add(const std::optional<std::string>& ply) {
+Result<SeenSides> LiveSession::add(const std::optional<std::string>& ply) {
   std::string refusal = ply ? "" : clouds_.problem();
   if (ply) {
     auto name = clouds_.keep(*ply);
@@ -107,7 +113,9 @@ Result<> LiveSession::add(const std::optional<std::string>& ply) {
   if (!refusal.empty() && (reason_.empty() || turntable)) say("left out: " + refusal);
   if (refusal.empty() && !reason_.empty() && !turntable) say("found the object again");
   reason_ = std::move(refusal);
-  return {};
+  SeenSides sides = builder_.sides();
+  on_cloud_(builder_, sides, reason_);
+  return sides;
 }
 
 void LiveSession::say(const std::string& sentence) {
@@ -116,8 +124,7 @@ void LiveSession::say(const std::string& sentence) {
 }
 
 /// Rewrites a line on a terminal; elsewhere adds one for each 30 degrees.
-void LiveSession::show_progress() {
-  const SeenSides sides = builder_.sides();
+void LiveSession::show_progress(const SeenSides& sides) {
   const std::string text = fmt::format("{} clouds; {}", builder_.placed(), to_string(sides));
   if (::isatty(STDERR_FILENO) != 0) {
     std::fprintf(stderr, "\r%-100s", text.c_str());

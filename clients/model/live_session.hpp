@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -20,11 +21,14 @@ struct LiveOptions {
   std::optional<double> seconds;  ///< the longest time
 };
 
+/// Tells of each cloud. @param left_out  why it has no place; empty: it has one
+using OnCloud = std::function<void(const ModelBuilder&, const SeenSides&, const std::string& left_out)>;
+
 /// Follows an object through the clouds of a running service, and tells what it still has to see.
 /// @thread thread-bound
 class LiveSession {
  public:
-  LiveSession(LiveClouds clouds, const ModelOptions& model, const LiveOptions& options, Tell tell);
+  LiveSession(LiveClouds clouds, const ModelOptions& model, const LiveOptions& options, Tell tell, OnCloud on_cloud);
 
   /// Leaves out what a cloud of the empty scene shows. @errors as ModelBuilder::set_background()
   [[nodiscard]] Result<> set_background(std::string_view ply) { return builder_.set_background(ply); }
@@ -32,7 +36,7 @@ class LiveSession {
   [[nodiscard]] Result<> follow();
   [[nodiscard]] std::size_t placed() const { return builder_.placed(); }
   /// Builds the model of the clouds so far. @errors as ModelBuilder::finish()
-  [[nodiscard]] Result<Model> finish();
+  [[nodiscard]] Result<Model> finish(const Advance& advance);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -40,15 +44,17 @@ class LiveSession {
   [[nodiscard]] Result<> follow_object();
   [[nodiscard]] Result<> follow_turntable();
   [[nodiscard]] Result<> scan_view(int view);
-  [[nodiscard]] Result<> add(const std::optional<std::string>& ply);
-  [[nodiscard]] bool enough() const;
+  /// @return the sides that were seen so far
+  [[nodiscard]] Result<SeenSides> add(const std::optional<std::string>& ply);
+  [[nodiscard]] bool enough(const SeenSides& sides) const;
   void say(const std::string& sentence);
-  void show_progress();
+  void show_progress(const SeenSides& sides);
 
   LiveClouds clouds_;
   ModelBuilder builder_;
   LiveOptions options_;
   Tell tell_;
+  OnCloud on_cloud_;
   std::string reason_;  // why the latest cloud has no place
   bool input_ended_ = false;
   bool progress_ = false;  // a line of progress is not ended

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "clients/model/build_model.hpp"
 #include "clients/model/live_session.hpp"
 #include "clients/model/mesh/mesh_3mf.hpp"
+#include "clients/model/progress/progress.hpp"
 #include "clients/model/recorded_clouds.hpp"
 #include "clients/usage/usage.hpp"
 #include "core/mesh/mesh_file.hpp"
@@ -26,11 +28,6 @@ namespace {
 using namespace slsd;
 
 constexpr const char* k3mf = ".3mf";
-
-int failed(const Error& error) {
-  std::fprintf(stderr, "slsd-model: %s\n", to_string(error).c_str());
-  return 1;
-}
 
 nlohmann::json to_json(const model::ModelReport& report, const Mesh& mesh) {
   nlohmann::json refused = nlohmann::json::array();
@@ -82,25 +79,32 @@ std::string to_text(const model::ModelReport& report, const Mesh& mesh) {
 
 struct Options {
   std::filesystem::path socket = client::default_socket();
-  std::filesystem::path recording, output, keep, background;
+  std::filesystem::path recording, keep, background, preview;
+  std::vector<std::filesystem::path> outputs;
   std::vector<float> box_mm;  ///< least x, y, z, then greatest
   bool turntable = false;
   model::LiveOptions live;
   model::ModelOptions model;
-  bool json = false;
+  bool json = false, progress = false;
 };
 
-void tell(const std::string& sentence) {
-  std::fprintf(stderr, "slsd-model: %s\n", sentence.c_str());
+Result<> write_model(const std::filesystem::path& file, const Mesh& mesh, const std::string& title) {
+  const std::string extension = lower_extension(file);
+  const auto bytes =
+      extension == k3mf ? model::write_3mf(mesh, title) : write_mesh(mesh, *mesh_format(extension.substr(1)), title);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return write_file_atomically(file, *bytes);
 }
 
-int write_model(const Options& options, const Result<model::Model>& built, const std::string& subject) {
-  if (!built) return failed(built.error());
-  const std::string extension = lower_extension(options.output), title = "slsd-model of " + subject;
-  const auto bytes = extension == k3mf ? model::write_3mf(built->mesh, title)
-                                       : write_mesh(built->mesh, *mesh_format(extension.substr(1)), title);
-  if (!bytes) return failed(bytes.error());
-  if (auto written = write_file_atomically(options.output, *bytes); !written) return failed(written.error());
+/// Writes the model and its report. @return the exit status
+int deliver(const Options& options, const Result<model::Model>& built, const std::string& subject,
+            model::Progress& progress) {
+  if (!built) return progress.fail(built.error());
+  for (const std::filesystem::path& file : options.outputs)
+    if (auto written = write_model(file, built->mesh, "slsd-model of " + subject); !written)
+      return progress.fail(written.error());
+  progress.finish(built->mesh);
+  if (options.progress) return progress.report(to_json(built->report, built->mesh)) ? 0 : 1;
   const std::string report =
       options.json ? to_json(built->report, built->mesh).dump() + "\n" : to_text(built->report, built->mesh);
   return std::fputs(report.c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
@@ -119,41 +123,50 @@ Result<> give_background(const Options& options, Taker& taker) {
   });
 }
 
-int run_recorded(const Options& options) {
+int run_recorded(const Options& options, model::Progress& progress) {
   const auto recorded = model::read_recording(options.recording);
-  if (!recorded) return failed(recorded.error());
-  for (const std::string& warning : recorded->warnings) tell(warning);
+  if (!recorded) return progress.fail(recorded.error());
+  for (const std::string& warning : recorded->warnings) progress.say(warning);
   const auto read = [&recorded](const std::string& name) { return model::read_recorded(*recorded, name); };
   model::ModelBuilder builder(recorded->calibration, options.model);
-  if (auto given = give_background(options, builder); !given) return failed(given.error());
+  if (auto given = give_background(options, builder); !given) return progress.fail(given.error());
   for (const std::string& name : recorded->names) {
     const auto ply = read(name);
-    if (!ply) {
-      builder.leave_out(name, ply.error().message);
-      tell(name + ": left out: " + ply.error().message);
-      continue;
+    std::string refusal;
+    if (ply) {
+      const auto added = builder.add(name, *ply);
+      if (!added) return progress.fail(added.error());
+      refusal = added->refusal;
+      if (added->found_again) progress.say(name + ": found the object again");
+    } else {
+      refusal = ply.error().message;
+      builder.leave_out(name, refusal);
     }
-    const auto added = builder.add(name, *ply);
-    if (!added) return failed(added.error());
-    if (!added->refusal.empty()) tell(name + ": left out: " + added->refusal);
-    if (added->found_again) tell(name + ": found the object again");
+    if (!refusal.empty()) progress.say(name + ": left out: " + refusal);
+    progress.add_cloud(builder, builder.sides(), refusal);
   }
-  return write_model(options, builder.finish(read, tell), options.recording.filename().string());
+  const auto tell = [&progress](const std::string& sentence) { progress.say(sentence); };
+  const auto advance = [&progress](std::size_t done, std::size_t clouds) { progress.build(done, clouds); };
+  return deliver(options, builder.finish(read, tell, advance), options.recording.filename().string(), progress);
 }
 
-int run_live(const Options& options) {
+int run_live(const Options& options, model::Progress& progress) {
+  Interrupt::watch();
   auto clouds = model::LiveClouds::open(
       options.socket, options.keep.empty() ? std::nullopt : std::optional<std::filesystem::path>(options.keep));
-  if (!clouds) return failed(clouds.error());
-  model::LiveSession session(std::move(*clouds), options.model, options.live, tell);
-  if (auto given = give_background(options, session); !given) return failed(given.error());
-  Interrupt::watch();
+  if (!clouds) return progress.fail(clouds.error());
+  const auto tell = [&progress](const std::string& sentence) { progress.say(sentence); };
+  const auto on_cloud = [&progress](const model::ModelBuilder& builder, const model::SeenSides& sides,
+                                    const std::string& left_out) { progress.add_cloud(builder, sides, left_out); };
+  model::LiveSession session(std::move(*clouds), options.model, options.live, tell, on_cloud);
+  if (auto given = give_background(options, session); !given) return progress.fail(given.error());
   const Result<> ended = session.follow();
   if (!ended) {
-    if (session.placed() == 0) return failed(ended.error());
-    tell(to_string(ended.error()) + "; the model is of the clouds before that");
+    if (session.placed() == 0) return progress.fail(ended.error());
+    progress.say(to_string(ended.error()) + "; the model is of the clouds before that");
   }
-  const int status = write_model(options, session.finish(), "clouds of the scanner");
+  const auto advance = [&progress](std::size_t done, std::size_t all) { progress.build(done, all); };
+  const int status = deliver(options, session.finish(advance), "clouds of the scanner", progress);
   return status == 0 && !ended ? 1 : status;
 }
 
@@ -163,13 +176,18 @@ int run(Options options) {
     options.model.box = model::Box(Eigen::Vector3f(box[0], box[1], box[2]), Eigen::Vector3f(box[3], box[4], box[5]));
   }
   if (options.turntable) options.model.step_degrees = 360.0 / options.live.views;
-  if (auto writable = check_writable(options.output); !writable) return failed(writable.error());
-  return options.recording.empty() ? run_live(options) : run_recorded(options);
+  model::Progress progress(options.progress, options.preview);
+  for (const std::filesystem::path& file : options.outputs)
+    if (auto writable = check_writable(file); !writable) return progress.fail(writable.error());
+  return options.recording.empty() ? run_live(options, progress) : run_recorded(options, progress);
 }
 
 void check(const Options& options) {
-  const std::string extension = lower_extension(options.output);
-  if (extension != k3mf && (extension.empty() || !mesh_format(extension.substr(1))))
+  const auto is_mesh = [](const std::filesystem::path& file) {
+    const std::string extension = lower_extension(file);
+    return extension == k3mf || (!extension.empty() && mesh_format(extension.substr(1)));
+  };
+  if (options.outputs.empty() || !std::ranges::all_of(options.outputs, is_mesh))
     throw CLI::ValidationError("--output", "the file's name ends in .ply, .stl, .obj, .glb or .3mf");
   if (options.turntable && options.live.views == 0)
     throw CLI::ValidationError("--turntable", "say how many views a full turn has: --views 24");
@@ -188,7 +206,9 @@ int main(int argc, char** argv) {
       "slsd-model");
   Options options;
   app.set_version_flag("--version", "slsd-model " SLSD_VERSION);
-  app.add_option("-o,--output", options.output, "the mesh: .ply, .stl, .obj, .glb or .3mf");
+  app.add_option("-o,--output", options.outputs,
+                 "the mesh: .ply, .stl, .obj, .glb or .3mf; several for several formats")
+      ->allow_extra_args(false);
   auto* const from =
       app.add_option("--from", options.recording, "the folder of a recording of slsctl that has clouds; else scan now");
   const auto live = [&](CLI::Option* option) { return option->excludes(from); };
@@ -213,7 +233,9 @@ int main(int argc, char** argv) {
       ->check(between(0.01, 100.0));
   app.add_flag("--close", options.model.close,
                "close the holes, as for printing: invent surface where none was measured");
-  app.add_flag("--json", options.json, "print the report as JSON");
+  app.add_option("--preview", options.preview, "write points of the growing model into this file, a PLY");
+  auto* const json = app.add_flag("--json", options.json, "print the report as JSON");
+  app.add_flag("--progress", options.progress, "print lines of JSON: the progress, then the report")->excludes(json);
   if (const auto ended = parse_usage(app, argc, argv, [&options] { check(options); })) return *ended;
   return run(options);
 }

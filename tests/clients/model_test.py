@@ -314,6 +314,71 @@ class Model(unittest.TestCase):
         self.assertEqual((self.folder / "again.ply").read_bytes().split(b"end_header")[1],
                          (self.folder / "live.ply").read_bytes().split(b"end_header")[1])
 
+    def preview(self, file):
+        """The points of a preview, which lie on the truth and face outward."""
+        head, body = file.read_bytes().split(b"end_header\n", 1)
+        fields = [(name, {"float": "<f4", "uchar": "u1"}[kind]) for kind, name in re.findall(r"property (\w+) (\w+)", head.decode())]
+        points = np.frombuffer(body, np.dtype(fields))
+        self.assertEqual(len(points), int(re.search(rb"element vertex (\d+)", head)[1]))
+        at = np.stack([points[axis] for axis in "xyz"], -1).astype(float) - MIDDLE
+        outward = np.stack([bumpy_ball(at + 0.01 * axis) - bumpy_ball(at - 0.01 * axis) for axis in np.eye(3)], -1)
+        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        normals = np.stack([points["n" + axis] for axis in "xyz"], -1)
+        self.assertGreater(np.quantile((normals * outward).sum(axis=1), 0.05), 0.95)
+        self.assertLess(np.quantile(abs(off_truth_mm(points)), 0.95), 0.2)
+        return points
+
+    def test_lines_of_progress_tell_it_to_other_programs(self):
+        done = run("--from", self.turning, "-o", self.folder / "p.ply", "-o", self.folder / "p.stl", "--progress", "--preview",
+                   self.folder / "preview.ply")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = [json.loads(line) for line in done.stdout.splitlines()]
+        told = [line["progress"] for line in lines if "progress" in line]
+        self.assertEqual([each["placed"] for each in told], list(range(1, 31)))
+        self.assertEqual([each["clouds"] for each in told], list(range(1, 31)))
+        self.assertEqual(len(told[-1]["views_degrees"]), 30)
+        np.testing.assert_allclose(told[-1]["views_degrees"], range(0, 360, STEP_DEGREES), atol=2)
+        self.assertAlmostEqual(told[9]["seen_degrees"], 9 * STEP_DEGREES, delta=6)
+        self.assertAlmostEqual(told[9]["missing_from_degrees"], 9 * STEP_DEGREES, delta=6)
+        self.assertEqual([each["seen_from_all_sides"] for each in told], [False] * 28 + [True] * 2)
+        fused = [line["building"]["fused"] for line in lines if "building" in line]
+        self.assertEqual(fused, [0, *range(31)])
+        self.assertEqual(list(lines[-1]), ["report"])
+        self.assertEqual(lines[-1]["report"], self.report)
+        points = self.preview(self.folder / "preview.ply")
+        self.assertLess(len(points), 120_000)
+        self.assertTrue((points["sigma_mm"] > 0).all())
+        self.assertEqual((self.folder / "p.ply").read_bytes(), (self.folder / "a.ply").read_bytes())
+        self.assertEqual(len((self.folder / "p.stl").read_bytes()), 84 + 50 * len(self.triangles))
+
+    def test_a_preview_grows_while_the_object_turns(self):
+        file, sizes = self.folder / "growing.ply", []
+
+        def clouds(number):
+            if file.exists():
+                sizes.append(len(self.preview(file)))
+            return self.clouds[min(number, 29)]
+        scanner, _ = self.scanner(clouds)
+        done = run("--socket", scanner.path, "--until-closed", "-o", self.folder / "grown.ply", "--preview", file, "--progress")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(sizes, sorted(sizes))
+        self.assertGreater(sizes[-1], 1.5 * sizes[0])
+        previewed = [json.loads(line)["progress"]["previewed"] for line in done.stdout.splitlines() if '"progress"' in line]
+        self.assertEqual(previewed[0], 1)
+
+    def test_lines_of_progress_end_with_the_error(self):
+        lone = record(self.folder / "lonely", self.clouds[:1])
+        done = run("--from", lone, "-o", self.folder / "none.ply", "--progress")
+        self.assertEqual(done.returncode, 1)
+        error = json.loads(done.stdout.splitlines()[-1])["error"]
+        self.assertIn("no place was measured by two clouds", error["message"])
+        self.assertIn(error["message"], done.stderr)
+
+    def test_a_preview_that_cannot_be_written_is_no_end(self):
+        done = run("--from", self.turning, "-o", self.folder / "p.ply", "--preview", self.folder / "missing/preview.ply")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(done.stderr.count("no more previews: "), 1)
+
     def test_a_turntable_is_scanned_at_each_line(self):
         """Its first step of 30 degrees is more than the tracker follows unaided."""
         views = [cloud(bumpy_ball, degrees, degrees) for degrees in range(0, 360, 30)]

@@ -17,6 +17,8 @@ namespace {
 constexpr double kDegrees = 180 / std::numbers::pi;
 /// An axis is known once the object has turned so far in all.
 constexpr double kLeastTurnDegrees = 5;
+/// So far an angle may lie below that of the first view by rounding alone.
+constexpr double kRoundingDegrees = 1e-6;
 
 struct Turning {
   Eigen::Vector3d axis = Eigen::Vector3d::Zero();  ///< in the object's frame, along the turn of the views
@@ -58,8 +60,9 @@ SeenSides seen_sides(std::span<const RigidTransform> object_from_rig, const Eige
   for (const RigidTransform& place : object_from_rig) {
     const Eigen::Vector3d ray = across(place);
     const double angle = std::atan2(ray.dot(second), ray.dot(first)) * kDegrees;
-    angles.push_back(angle < 0 ? angle + 360 : angle);
+    angles.push_back(angle < -kRoundingDegrees ? angle + 360 : std::max(0.0, angle));
   }
+  sides.views_degrees = angles;
   std::ranges::sort(angles);
   sides.gap_begins_degrees = angles.back();
   sides.gap_degrees = 360 - angles.back() + angles.front();

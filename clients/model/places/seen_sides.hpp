@@ -4,6 +4,7 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -13,9 +14,10 @@ namespace slsd::model {
 
 /// The sides from which a turning object was seen: angles about the axis of its turns, from the first view on.
 struct SeenSides {
-  double seen_degrees = 0;        ///< 360 minus the widest gap between two views
-  double gap_begins_degrees = 0;  ///< of the widest gap, in the direction of the turn
-  double gap_degrees = 360;       ///< its width
+  double seen_degrees = 0;            ///< 360 minus the widest gap between two views
+  double gap_begins_degrees = 0;      ///< of the widest gap, in the direction of the turn
+  double gap_degrees = 360;           ///< its width
+  std::vector<double> views_degrees;  ///< of each view, in order; none if there is no axis
 
   /// Tells whether neighbouring views are at most 30 degrees apart all the way round: each place of a ring about the
   /// axis was then seen from within 15 degrees of its own side.

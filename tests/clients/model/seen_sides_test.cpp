@@ -33,6 +33,8 @@ TEST(SeenSides, GrowWithTheTurn) {
     EXPECT_NEAR(sides.seen_degrees, 50, 4);  // a tilted axis shows a smaller circle
     EXPECT_NEAR(sides.gap_begins_degrees, 50, 4);
     EXPECT_FALSE(sides.all());
+    ASSERT_EQ(sides.views_degrees.size(), 6);
+    for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(sides.views_degrees[i], 10.0 * static_cast<double>(i), 4);
   }
 }
 
