@@ -55,10 +55,13 @@ Result<> Recording::make_folders() const {
 Result<> Recording::write_settings() {
   Result<> written = write("pattern.toml", settings_.value("pattern", ""));
   if (written) written = write("calibration.yml", settings_.value("calibration", ""));
+  if (written && settings_.contains("hand_eye_file"))
+    written = write("hand_eye.yml", settings_.value("hand_eye_file", ""));
   if (written) written = write("slsd.toml", replay_configuration(settings_, cameras_));
   for (std::size_t i = 0; i < cameras_.size(); ++i) settings_["cameras"][i]["folder"] = cameras_[i].folder;
   settings_.erase("pattern");
   settings_.erase("calibration");
+  settings_.erase("hand_eye_file");
   return written ? write_summary() : written;
 }
 

@@ -54,8 +54,10 @@ std::string write_hand_eye(const HandEyeCalibration& hand_eye) {
   file.write("mounted", std::string(keys.name));
   file.write(keys.rotation, hand_eye.mount_from_rig.rotation);
   file.write(keys.translation, hand_eye.mount_from_rig.translation);
+  if (!hand_eye.verdict.empty()) file.write("verdict", hand_eye.verdict);
+  if (!hand_eye.calibration_date.empty()) file.write("calibration_date", hand_eye.calibration_date);
+  if (hand_eye.poses == 0) return file.take();  // it was read from a file
   file.write("covariance", hand_eye.covariance);
-  file.write("verdict", hand_eye.verdict);
   file.write("distance_mm", hand_eye.distance_mm);
   file.write("error_mm", hand_eye.error_mm);
   file.write("robot_place_sigma_mm", hand_eye.robot_place_mm);
@@ -63,7 +65,6 @@ std::string write_hand_eye(const HandEyeCalibration& hand_eye) {
   file.write("poses", hand_eye.poses);
   file.write("board", hand_eye.board);
   file.write("date", hand_eye.date);
-  if (!hand_eye.calibration_date.empty()) file.write("calibration_date", hand_eye.calibration_date);
   return file.take();
 }
 

@@ -30,6 +30,7 @@ struct HandEyeCalibration {
 /// Reads a hand-eye file's text (OpenCV FileStorage YAML, keys in docs/formats.md): mounting and place.
 /// @errors kMalformed, kInvalidArgument: the message names the key
 [[nodiscard]] Result<HandEyeCalibration> read_hand_eye(std::string_view text, std::string_view name);
+/// Writes it; what read_hand_eye() does not read only if it is known.
 [[nodiscard]] std::string write_hand_eye(const HandEyeCalibration& hand_eye);
 
 }  // namespace slsd

@@ -36,8 +36,9 @@ struct BundleNotes {
 [[nodiscard]] Result<std::string> write_bundle(const std::vector<KeptScan>& scans, const BundleNotes& notes,
                                                std::chrono::system_clock::time_point now);
 
-/// All keys of [decode] with the values in force, from any source.
+/// All keys of [decode] and of [cloud] with the values in force, from any source.
 [[nodiscard]] nlohmann::json decode_keys(const DecodeOptions& options);
+[[nodiscard]] nlohmann::json cloud_keys(const CloudOptions& options);
 
 /// A frame of a bundle.
 struct BundledFrame {
@@ -55,7 +56,9 @@ struct BundledScan {
   std::vector<BundledFrame> frames;
   std::vector<double> full_levels;
   bool dense = false;
-  std::optional<std::string_view> cloud;  ///< the PLY of the symbols
+  CloudOptions part;                            ///< the part of the scene that the cloud shows
+  std::optional<RigidTransform> base_from_rig;  ///< if the part is in the robot's base
+  std::optional<std::string_view> cloud;        ///< the PLY of the symbols
 };
 
 /// Scans that the same setup decoded.

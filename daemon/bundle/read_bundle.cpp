@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include <algorithm>
+#include <limits>
 #include <map>
 
+#include "core/geometry/robot_pose.hpp"
 #include "core/printable.hpp"
 #include "daemon/bundle/bundle.hpp"
 #include "daemon/rpc/request.hpp"
@@ -38,6 +40,43 @@ T member(const json& object, const char* name, bool (json::*of_type)() const noe
 
 std::string text_of(const json& object, const char* name) {
   return member<std::string>(object, name, &json::is_string, {});
+}
+
+/// Reads numbers that write_bundle() wrote. @return nothing if one is no number
+std::optional<std::vector<double>> numbers_in(const json& object, const char* name) {
+  std::vector<double> numbers;
+  for (const json& number : member<json>(object, name, &json::is_array, json::array())) {
+    if (!number.is_number()) return std::nullopt;
+    numbers.push_back(number.get<double>());
+  }
+  return numbers;
+}
+
+/// Reads the part of the scene that a scan's cloud shows; everything if the line names none.
+Result<> read_part(const json& line, const std::string& where, BundledScan& scan) {
+  const auto told = line.find("part");
+  if (told == line.end()) return {};
+  if (!told->is_object()) return fail_part("part must be an object", where);
+  const auto box = numbers_in(*told, "box"), plane = numbers_in(*told, "plane"),
+             base_from_rig = numbers_in(*told, "base_from_rig");
+  if (!box || !plane || !base_from_rig) return fail_part("part must have lists of numbers", where);
+  const auto stride = member<std::int64_t>(*told, "stride", &json::is_number_integer, 1);
+  scan.part = {*box, *plane,
+               text_of(*told, "box_frame") == "robot_base" ? CoordinateFrame::kRobotBase : CoordinateFrame::kRig,
+               member<double>(*told, "voxel_mm", &json::is_number, 0),
+               static_cast<int>(std::clamp<std::int64_t>(stride, 0, std::numeric_limits<int>::max()))};
+  if (auto valid = scan.part.validate(); !valid)
+    return fail_part("part: " + valid.error().where + " " + valid.error().message, where);
+  if (base_from_rig->empty()) return {};
+  const auto place = read_robot_pose(*base_from_rig, {TurnNumbers::kMatrix, /*unit_mm=*/1, /*unit_rad=*/1});
+  if (!place) return fail_part("base_from_rig " + place.error().message, where);
+  scan.base_from_rig.emplace();
+  for (Eigen::Index row = 0; row < 3; ++row) {  // to the last bit, as the service had it
+    const double* const four = base_from_rig->data() + 4 * row;
+    scan.base_from_rig->rotation.row(row) = Eigen::RowVector3d(four[0], four[1], four[2]);
+    scan.base_from_rig->translation[row] = four[3];
+  }
+  return {};
 }
 
 class Reader {
@@ -119,6 +158,7 @@ class Reader {
         text_of(member<json>(*line, "error", &json::is_object, json::object()).value("data", json::object()), "name"),
         64);
     scan.dense = text_of(*line, "density") == to_string(Density::kPixels);
+    if (auto read = read_part(*line, where, scan); !read) return tl::unexpected(read.error());
     for (const json& level : member<json>(*line, "full_levels", &json::is_array, json::array())) {
       if (!level.is_number()) return fail_part("full_levels must hold only numbers", where);
       scan.full_levels.push_back(level.get<double>());

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "core/calibration_file/calibration_file.hpp"
+#include "core/calibration_file/hand_eye_file.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/shown_picture.hpp"
 #include "core/utc_text.hpp"
@@ -48,7 +49,8 @@ class RecordingPart {
     about_ = {{"version", SLSD_VERSION},
               {"projector", {{"width_px", pattern.projector_width_px}, {"height_px", pattern.projector_height_px}}},
               {"cameras", json::array()},
-              {"configuration", {{"decode", decode_keys(settings.decode)}}}};
+              {"configuration", {{"decode", decode_keys(settings.decode)}, {"cloud", cloud_keys(settings.cloud)}}}};
+    if (settings.hand_eye) about_["hand_eye_file"] = write_hand_eye(*settings.hand_eye);
     for (const std::string& camera : settings.camera_names) about_["cameras"].push_back({{"name", camera}});
     cameras_ = recorded_cameras(about_);
     for (std::size_t i = 0; i < cameras_.size(); ++i) {
@@ -63,8 +65,9 @@ class RecordingPart {
     if (scan.too_large) line["frames_left_out"] = "the frames of one scan exceed [black_box] memory_max_mb";
     if (scan.frames) {
       line["density"] = to_string(scan.density);
+      if (scan.part != CloudOptions{}) line["part"] = part_json(scan);
       for (const FrameImage& image : *scan.frames) {
-        auto frame = add_frame(image);
+        auto frame = put_frame(image);
         if (!frame) return tl::unexpected(frame.error());
         line["frames"].push_back(std::move(*frame));
       }
@@ -87,6 +90,8 @@ class RecordingPart {
     put("slsd.toml", replay_configuration(about_, cameras_));
     put("pattern.toml", write_pattern(settings_.pattern));
     put("calibration.yml", settings_.calibration ? write_calibration(*settings_.calibration) : std::string());
+    if (settings_.hand_eye) put("hand_eye.yml", about_["hand_eye_file"].get_ref<const std::string&>());
+    about_.erase("hand_eye_file");
     put("scans.jsonl", lines_);
     put("recording.json", about_.dump(2) + "\n");
     if (!long_name_.empty())
@@ -107,7 +112,13 @@ class RecordingPart {
     return line;
   }
 
-  [[nodiscard]] Result<json> add_frame(const FrameImage& image) {
+  [[nodiscard]] static json part_json(const KeptScan& scan) {
+    json part = cloud_keys(scan.part);
+    add_frame(part, scan.base_from_rig ? &*scan.base_from_rig : nullptr);
+    return part;
+  }
+
+  [[nodiscard]] Result<json> put_frame(const FrameImage& image) {
     const auto png = encode_png(view_of(image));
     if (!png) return tl::unexpected(png.error());
     json frame = frame_json(image);
@@ -156,6 +167,14 @@ json decode_keys(const DecodeOptions& options) {
           {"link_grid", method_name(options.link_grid)},
           {"decode_windows", method_name(options.decode_windows)},
           {"correspond", method_name(options.correspond)}};
+}
+
+json cloud_keys(const CloudOptions& options) {
+  return {{"box", options.box},
+          {"plane", options.plane},
+          {"box_frame", options.box_frame == CoordinateFrame::kRobotBase ? "robot_base" : "rig"},
+          {"voxel_mm", options.voxel_mm},
+          {"stride", options.stride}};
 }
 
 Result<std::string> write_bundle(const std::vector<KeptScan>& scans, const BundleNotes& notes,

@@ -77,8 +77,9 @@ BlackBox::Entry& BlackBox::find_or_begin(const std::string& id, const SharedSetu
 std::shared_ptr<const KeptSettings> BlackBox::settings_of(const SharedSetup& setup) {
   if (settings_ && setup_.lock() == setup) return settings_;
   setup_ = setup;
-  settings_ = std::make_shared<const KeptSettings>(
-      KeptSettings{setup->pattern, setup->calibration, setup->decode, setup->camera_names, setup->camera_formats});
+  settings_ = std::make_shared<const KeptSettings>(KeptSettings{setup->pattern, setup->calibration, setup->decode,
+                                                                setup->camera_names, setup->camera_formats,
+                                                                setup->cloud, setup->hand_eye});
   return settings_;
 }
 
@@ -101,7 +102,8 @@ void BlackBox::make_room(const std::string& id) {
   }
 }
 
-void BlackBox::keep_frames(const std::string& id, const FrameSet& set, const SharedSetup& setup, Density density) {
+void BlackBox::keep_frames(const std::string& id, const FrameSet& set, const SharedSetup& setup,
+                           const ScanRequest& request) {
   std::size_t needed = 0;
   for (const auto* frames : {&set.frames, &set.white, &set.dark}) {
     for (const Frame& frame : *frames) needed += bytes_of(frame);
@@ -110,7 +112,9 @@ void BlackBox::keep_frames(const std::string& id, const FrameSet& set, const Sha
   {
     const std::lock_guard lock(mutex_);
     Entry& entry = find_or_begin(id, setup);
-    entry.scan.density = density;
+    entry.scan.density = request.formats.dense() ? Density::kPixels : Density::kSymbols;
+    entry.scan.part = request.part ? *request.part : setup->cloud;
+    if (entry.scan.part.in_base()) entry.scan.base_from_rig = setup->base_from_rig(request.base_from_flange);
     entry.scan.too_large = needed + kScanBytes > bytes_max_;
     if (entry.scan.too_large) return make_room(id);
     grow(entry, needed);

@@ -29,6 +29,8 @@ struct KeptSettings {
   DecodeOptions decode;
   std::vector<std::string> camera_names;
   std::vector<std::string> camera_formats;
+  CloudOptions cloud;  ///< the part of scans that ask for none
+  std::optional<HandEyeCalibration> hand_eye;
 };
 
 /// The frames of a kept scan as raw pixels: first the pattern, then white, then dark.
@@ -44,6 +46,8 @@ struct KeptScan {
   std::shared_ptr<const KeptFrames> frames;           ///< null: none, or too large to keep
   bool too_large = false;                             ///< its frames alone exceed the memory limit
   Density density = Density::kSymbols;                ///< density of the requested cloud
+  CloudOptions part = {};                             ///< the part of the scene that the cloud shows
+  std::optional<RigidTransform> base_from_rig = {};   ///< if the part is in the robot's base, and this is known
   std::shared_ptr<const Result<ScanResult>> outcome;  ///< null until decoded; no pictures or dense points
   std::uint64_t times = 1;                            ///< number of successive failures like this one without frames
 };
@@ -60,7 +64,7 @@ class BlackBox {
   /// The bytes held now.
   [[nodiscard]] std::size_t bytes() const;
 
-  void keep_frames(const std::string& id, const FrameSet& set, const SharedSetup& setup, Density density);
+  void keep_frames(const std::string& id, const FrameSet& set, const SharedSetup& setup, const ScanRequest& request);
   /// @param result  the outcome for the scan's client; unchanged after the call
   void keep_outcome(const std::string& id, const SharedSetup& setup, Result<ScanResult>& result);
 

@@ -306,7 +306,8 @@ double ScanSetup::full_level_of(std::size_t camera, std::span<const GreyView> fr
 }
 
 ScanFiles ScanSetup::files() const {
-  return {write_pattern(pattern), calibration ? write_calibration(*calibration) : std::string()};
+  return {write_pattern(pattern), calibration ? write_calibration(*calibration) : std::string(),
+          hand_eye ? write_hand_eye(*hand_eye) : std::string()};
 }
 
 }  // namespace slsd

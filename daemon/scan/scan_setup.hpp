@@ -42,6 +42,7 @@ namespace slsd {
 struct ScanFiles {
   std::string pattern;      ///< a pattern file
   std::string calibration;  ///< a calibration file; empty: none
+  std::string hand_eye;     ///< a hand-eye file; empty: none
 };
 
 /// The saturation levels that the cameras' frames have shown so far. If no format gives the bit depth, a faint frame

@@ -245,8 +245,7 @@ std::shared_ptr<Scan> Scanner::make_scan(ScanRequest request, bool listened, Ans
   Scan::Keep keep;
   if (black_box_.bytes_max() > 0) {
     keep = [this](const Scan& scan, const FrameSet& set) {
-      const Density density = scan.request().formats.dense() ? Density::kPixels : Density::kSymbols;
-      black_box_.keep_frames(scan.id(), set, scan.setup(), density);
+      black_box_.keep_frames(scan.id(), set, scan.setup(), scan.request());
     };
   }
   return std::make_shared<Scan>(

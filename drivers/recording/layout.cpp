@@ -50,14 +50,17 @@ std::vector<RecordedCamera> recorded_cameras(const json& settings) {
 }
 
 std::string replay_configuration(const json& settings, const std::vector<RecordedCamera>& cameras) {
-  const json decode = settings.value("configuration", json::object()).value("decode", json::object());
+  const json configuration = settings.value("configuration", json::object());
   std::string text = "# Replays this recording: slsd --config slsd.toml, and slsctl --socket slsd.sock scan\n";
   text += "[pattern]\n" + line("file", "pattern.toml");
   text += "\n[projector]\n" + line("driver", "headless") + lines(settings.value("projector", json::object()));
   for (const RecordedCamera& camera : cameras) text += camera_table(camera);
   text += "\n[calibration]\n" + line("file", "calibration.yml");
   text += "\n[scan]\n" + line("exposure_skew_ms", kSkewMaxMs);
-  text += "\n[decode]\n" + lines(decode);
+  if (settings.contains("hand_eye_file")) text += "\n[frame]\n" + line("hand_eye", "hand_eye.yml");
+  for (const char* table : {"decode", "cloud"}) {
+    text += "\n[" + std::string(table) + "]\n" + lines(configuration.value(table, json::object()));
+  }
   text += "\n[server]\n" + line("socket", "slsd.sock");
   return text;
 }

@@ -21,7 +21,7 @@ struct RecordedCamera {
 [[nodiscard]] std::vector<RecordedCamera> recorded_cameras(const nlohmann::json& settings);
 
 /// Writes a TOML configuration with which slsd replays a recording: frames through file cameras, with its pattern,
-/// calibration and [decode] keys.
+/// calibration, hand-eye calibration, and the keys of [decode] and [cloud].
 /// @param settings  the answer to `settings`
 /// @thread reentrant
 [[nodiscard]] std::string replay_configuration(const nlohmann::json& settings,

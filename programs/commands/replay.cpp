@@ -55,12 +55,15 @@ class Replay {
     }
     auto setup = ScanSetup::of(std::move(*pattern), std::move(calibration), *configuration, 1);
     if (!setup) return tl::unexpected(setup.error());
+    setup->hand_eye = HandEyeCalibration{};  // each scan tells where the rig was, as if the rig were the flange
     return Replay(std::move(*setup));
   }
 
   [[nodiscard]] Result<ScanResult> decode(const BundledScan& scan) {
     ScanRequest request;
     request.formats = CloudFormats::only({CloudFormat::kPly, scan.dense ? Density::kPixels : Density::kSymbols});
+    request.part = scan.part;
+    request.base_from_flange = scan.base_from_rig;
     if (auto possible = setup_.check(request); !possible) return tl::unexpected(possible.error());
     images_.clear();
     FrameSet set;

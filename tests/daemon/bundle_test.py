@@ -15,6 +15,7 @@ import tarfile
 import tempfile
 import unittest
 
+import robot_frame_test as robot_frame
 from client import RpcError
 from service import BIN, SCENE, Service, slsctl, wait_until
 
@@ -40,6 +41,15 @@ socket = "slsd.sock"
 [black_box]
 {black_box}
 """
+
+BOX = [-220.0, -180.0, 1500.0, 190.0, 210.0, 2600.0]  # some of the bust
+PLANE = [0.0, 0.0, -1.0, -2300.0]  # what is nearer
+
+
+def box_in_base(base_from_rig):
+    """Some of the bust, in the robot's base."""
+    at = base_from_rig[:3, :3] @ [0.0, 0.0, 2000.0] + base_from_rig[:3, 3]
+    return [*map(float, at - 180), *map(float, at + 180)]
 
 
 def replay(bundle, *arguments):
@@ -110,6 +120,63 @@ class Bundle(unittest.TestCase):
         with again, again.client() as client:
             cloud = client.call("scan", timeout_ms=600000)[1]
         self.assertEqual(cloud.split(b"end_header\n", 1)[1], clouds[0].split(b"end_header\n", 1)[1])
+
+    def check_replays_parts(self, table, scans, hand_eye=None):
+        """Scans by their parameters: the bundle decodes each to the points that the service gave."""
+        service = service_on(["16px-5-bust"])
+        service.file.write_text(service.file.read_text(encoding="utf-8") + table, encoding="utf-8")
+        if hand_eye:
+            (service.folder / "hand_eye.yml").write_text(hand_eye, encoding="utf-8")
+        with service:
+            service.wait_ready()
+            with service.client() as client:
+                clouds = [client.call("scan", timeout_ms=600000, **{"coordinate_frame": "rig", **scan})[1] for scan in scans]
+            files = self.bundle(service)
+        result = replay(self.file, "--unpack", self.folder / "unpacked")
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        self.assertEqual(result.stdout.count("the same cloud, byte for byte"), len(scans))
+        replayed = self.folder / "unpacked" / "recording-1" / "replayed"
+        for i, (scan, cloud) in enumerate(zip(scans, clouds)):
+            ending = ".dense.ply" if "density" in scan else ".ply"
+            self.assertEqual((replayed / f"{i:08}{ending}").read_bytes(), bytes(cloud), scan)
+        return clouds, files
+
+    def check_service_replays(self, files, cloud, **scan):
+        """As every recording does, the bundle's replays through the service, too."""
+        again = Service(configuration=files["recording-1/slsd.toml"].decode())
+        shutil.copytree(self.folder / "unpacked" / "recording-1", again.folder, dirs_exist_ok=True)
+        with again, again.client() as client:
+            told = client.call("scan", timeout_ms=600000, **scan)[1]
+        self.assertEqual(bytes(told).split(b"end_header\n", 1)[1], bytes(cloud).split(b"end_header\n", 1)[1])
+
+    def test_replays_the_part_that_each_scan_showed(self):
+        table = f"[cloud]\nbox = {BOX}\nplane = {PLANE}\nstride = 2\n"
+        clouds, files = self.check_replays_parts(table, [
+            {}, {"density": "pixels"}, {"box": [], "plane": [], "stride": 1}, {"voxel_mm": 20.5},
+            {"box": [BOX[0] + 0.1, *BOX[1:]], "plane": [], "density": "pixels", "voxel_mm": 3}])
+        points = [len(cloud) for cloud in clouds]
+        self.assertLess(points[0], points[2] / 2)
+        self.assertLess(points[3], points[0])
+        self.assertGreater(points[3], 1000)
+        lines = [json.loads(line) for line in files["recording-1/scans.jsonl"].splitlines()]
+        self.assertEqual(lines[0]["part"], {"box": BOX, "plane": PLANE, "box_frame": "rig", "voxel_mm": 0, "stride": 2})
+        self.assertNotIn("part", lines[2])
+        self.check_service_replays(files, clouds[0])
+
+    def test_replays_a_part_in_the_robots_base(self):
+        """On an arm, which has another pose at each scan; in a cell, the configuration alone places it."""
+        pose = {"poses": "ur", "box_frame": "robot_base"}
+        at = [[*robot_frame.POSE_UR], [0.41, -0.2, *robot_frame.POSE_UR[2:]]]
+        boxes = [box_in_base(robot_frame.pose_of(each) @ robot_frame.MOUNT) for each in at]
+        self.check_replays_parts('[frame]\nhand_eye = "hand_eye.yml"\n', [
+            {"robot_pose": at[0], "box": boxes[0], **pose}, {"robot_pose": at[1], "box": boxes[1], **pose},
+            {"robot_pose": at[1], "box": boxes[1], "density": "pixels", **pose}, {}], robot_frame.hand_eye("arm"))
+        shutil.rmtree(self.folder / "unpacked")
+        box = box_in_base(robot_frame.MOUNT)
+        table = f'[frame]\nhand_eye = "hand_eye.yml"\n[cloud]\nbox = {box}\nbox_frame = "robot_base"\n'
+        clouds, files = self.check_replays_parts(table, [{}, {"box": []}], robot_frame.hand_eye("cell"))
+        self.assertLess(len(clouds[0]), 0.7 * len(clouds[1]))
+        self.check_service_replays(files, clouds[0])
 
     def test_holds_what_the_service_says_of_itself(self):
         with service_on(["16px-5-bust"]) as service:
@@ -246,6 +313,12 @@ class Bundle(unittest.TestCase):
         self.refused({**files, "recording-1/scans.jsonl": lines}, "order of the cameras")
         lines = files["recording-1/scans.jsonl"].replace(b"camera/00000000.png", b"../../../etc/passwd")
         self.refused({**files, "recording-1/scans.jsonl": lines}, "passwd: is missing from the bundle")
+        for part, said in (('7', "part must be an object"), ('{"box":[1,2]}', "box must have six numbers"), ('{"box":[1,2,3,4,5,"6"]}', "lists of numbers"),
+                           ('{"stride":4294967297}', "stride must be from 1 to 64"), ('{"voxel_mm":-1}', "voxel_mm must be from 0 to 1000"),
+                           ('{"plane":[0,0,1e300,0]}', "plane must have four numbers"), ('{"base_from_rig":[1,2]}', "base_from_rig .*16"),
+                           ('{"base_from_rig":[1,0,0,0,0,2,0,0,0,0,1,0,0,0,0,1]}', "base_from_rig .*no rotation")):
+            lines = files["recording-1/scans.jsonl"].replace(b'"density"', f'"part":{part},"density"'.encode())
+            self.refused({**files, "recording-1/scans.jsonl": lines}, said)
         other = files["recording-1/clouds/00000000.ply"][:-1] + b"\x7f"
         self.refused({**files, "recording-1/clouds/00000000.ply": other}, "another result than in the bundle")
         self.assertEqual(replay(self.folder).returncode, 1)

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import unittest
 
+import robot_frame_test as robot_frame
 from service import BIN, TIMEOUT_S, SCENE, Service, slsctl, wait_until
 
 CORPUS = pathlib.Path(__file__).parent.parent / "corpus"
@@ -142,6 +143,24 @@ class Record(unittest.TestCase):
             self.assertEqual(measured(recorded), measured(cloud))
         self.assertEqual(len(frames[0]), 2 * 1600 * 1200)
         self.assertNotEqual(measured(told[0][1]), measured(told[1][1]))
+
+    def test_replay_shows_the_same_part(self):
+        """A box in the robot's base and cubes, of a scanner in a robot's cell."""
+        service = Service()
+        at = (robot_frame.MOUNT[:3, :3] @ [0, 0, 2000] + robot_frame.MOUNT[:3, 3]).tolist()
+        (service.folder / "hand_eye.yml").write_text(robot_frame.hand_eye("cell"), encoding="utf-8")
+        with open(service.file, "a", encoding="utf-8") as file:
+            file.write('[frame]\noutput = "robot_base"\nhand_eye = "hand_eye.yml"\n[cloud]\nbox_frame = "robot_base"\nvoxel_mm = 15.5\n'
+                       f"box = {[each - 170 for each in at] + [each + 170 for each in at]}\n")
+        with service:
+            service.wait_ready()
+            self.assertEqual(self.record(service, "--frames", "1", "--clouds").returncode, 0)
+        line, = lines_of(self.recording)
+        self.assertTrue(50 < line["points"] < 1000, line["points"])
+        self.assertNotIn("hand_eye_file", (self.recording / "recording.json").read_text(encoding="utf-8"))
+        with self.replay() as service, service.client() as client:
+            cloud = client.call("scan", timeout_ms=600000)[1]
+        self.assertEqual(measured((self.recording / line["cloud"]).read_bytes()), measured(cloud))
 
     def test_holds_everything_that_a_cloud_depends_on(self):
         self.assertEqual(self.record(self.two, "--frames", "1").returncode, 0)

@@ -42,10 +42,15 @@ def rodrigues(vector):
     return numpy.eye(3) + numpy.sin(angle) * cross + (1 - numpy.cos(angle)) * cross @ cross
 
 
-def pose_matrix():
+def pose_of(numbers):
+    """The matrix of a pose as UR writes it, mm."""
     matrix = numpy.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rodrigues(POSE_UR[3:]), 1000 * numpy.array(POSE_UR[:3])
+    matrix[:3, :3], matrix[:3, 3] = rodrigues(numbers[3:]), 1000 * numpy.array(numbers[:3])
     return matrix
+
+
+def pose_matrix():
+    return pose_of(POSE_UR)
 
 
 def matrix_text(name, matrix):

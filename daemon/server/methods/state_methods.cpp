@@ -54,6 +54,7 @@ void run_settings(ServiceState& state, const json& params, Session&, Respond res
     reply.result["hand_eye"] = {{"mounted", setup->hand_eye->mounted == Mounted::kArm ? "arm" : "cell"}};
   reply.result["pattern"] = files.pattern;
   reply.result["calibration"] = files.calibration;
+  if (!files.hand_eye.empty()) reply.result["hand_eye_file"] = files.hand_eye;
   reply.result["set"] = state.settings;
   reply.result["file"] = state.configuration_file.string();
   respond(std::move(reply));

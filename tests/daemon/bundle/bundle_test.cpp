@@ -76,6 +76,21 @@ TEST(DecodeKeys, AreEveryKeyThere) {
   }
 }
 
+TEST(CloudKeys, AreEveryKeyThere) {
+  for (const CloudOptions& options :
+       {CloudOptions{}, CloudOptions{.box = {-0.1, 1e-9, 123.456789012345678, 1, 2, 1234.5},
+                        .plane = {0, 0.6, -0.8, 1e-3},
+                        .box_frame = CoordinateFrame::kRobotBase,
+                        .voxel_mm = 0.7,
+                        .stride = 3}}) {
+    nlohmann::json settings{{"configuration", {{"cloud", cloud_keys(options)}}}, {"hand_eye_file", ""}};
+    const auto read = test::read(replay_configuration(settings, {}));
+    ASSERT_TRUE(read) << to_string(read.error());
+    EXPECT_EQ(read->cloud, options);
+    EXPECT_EQ(read->frame.hand_eye, "etc/hand_eye.yml");  // beside the configuration
+  }
+}
+
 class BundleStoreTest : public ::testing::Test {
  protected:
   [[nodiscard]] std::vector<std::string> names() const {

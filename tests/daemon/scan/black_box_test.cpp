@@ -21,7 +21,7 @@ class BlackBoxTest : public ::testing::Test {
     return set;
   }
   void keep(int number) {
-    box_.keep_frames(std::to_string(number), set_of(static_cast<std::uint8_t>(number)), setup_, Density::kSymbols);
+    box_.keep_frames(std::to_string(number), set_of(static_cast<std::uint8_t>(number)), setup_, ScanRequest{});
     Result<ScanResult> result = ScanResult();
     box_.keep_outcome(std::to_string(number), setup_, result);
   }
@@ -60,7 +60,7 @@ TEST_F(BlackBoxTest, LeavesAloneWhatABundleIsMadeOf) {
 
 TEST_F(BlackBoxTest, AFrameThatIsTooLargeIsNotKept) {
   BlackBox small(kFrameBytes);
-  small.keep_frames("1", set_of(1), setup_, Density::kSymbols);
+  small.keep_frames("1", set_of(1), setup_, ScanRequest{});
   ASSERT_THAT(small.scans(), SizeIs(1));
   EXPECT_TRUE(small.scans().front().too_large);
   EXPECT_EQ(small.scans().front().frames, nullptr);
@@ -81,7 +81,7 @@ TEST_F(BlackBoxTest, CountsFailuresThatAreTheSame) {
 // A deadline may pass while its frames are decoded: what is told first comes to the same scan.
 TEST_F(BlackBoxTest, TakesOutcomeAndFramesInEitherOrder) {
   fail_scan("7", ErrorCode::kTimeout);
-  box_.keep_frames("7", set_of(7), setup_, Density::kSymbols);
+  box_.keep_frames("7", set_of(7), setup_, ScanRequest{});
   const auto scans = box_.scans();
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0].outcome->error().code, ErrorCode::kTimeout);
