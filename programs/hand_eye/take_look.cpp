@@ -64,6 +64,7 @@ Result<TakenLook> take_look(PoseSource& source, const path& folder, std::span<co
                             const PoseNotation& notation) {
   if (const auto pose = read_robot_pose(numbers, notation); !pose)
     return fail(pose.error().code, pose.error().message, "--pose");
+  if (auto fit = check_camera_folders(source.cameras()); !fit) return tl::unexpected(fit.error());
   auto lines = lines_so_far(folder / "poses.csv");
   if (!lines) return tl::unexpected(lines.error());
   source.show(Grey8(source.projector().width_px, source.projector().height_px, 255));

@@ -199,5 +199,121 @@ class HandEye(unittest.TestCase):
         self.assertFalse(self.captures.exists())
 
 
+TWO_CAMERAS = """
+[projector]
+width_px = 640
+height_px = 400
+[[camera]]
+name = "camera"
+path = "left"
+loop = false
+[[camera]]
+name = "right"
+path = "right"
+loop = false
+[calibration]
+file = "{folder}/calibration.yml"
+[scan]
+projector_latency_ms = 0.0
+exposure_skew_ms = 10000
+[server]
+socket = "slsd.sock"
+"""
+NOTHING = b"P5 800 600 255\n" + bytes(800 * 600)
+
+
+class TwoCameras(unittest.TestCase):
+    """A rig of two: each look has two pictures, and one of them may lack the board."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
+        atexit.register(shutil.rmtree, cls.folder, ignore_errors=True)
+        subprocess.run([BIN / "make_looks", cls.folder, "8", "2"], check=True, timeout=300)
+        rig_from_board = numpy.loadtxt(cls.folder / "looks.csv", delimiter=",").reshape(-1, 4, 4)
+        cls.poses = [BASE_FROM_BOARD @ numpy.linalg.inv(each) @ numpy.linalg.inv(FLANGE_FROM_RIG) for each in rig_from_board]
+
+    def setUp(self):
+        self.service = Service(configuration=TWO_CAMERAS.format(folder=self.folder))
+        self.captures = self.service.folder / "captures"
+
+    def copy(self, look, camera, to):
+        shutil.copy(self.folder / f"pose_{look:02}" / camera / "white.png", to)
+
+    def kept_captures(self, *looks):
+        """Those looks, as the robot's program saves them."""
+        for look in looks:
+            for camera in ("camera", "right"):
+                (self.captures / f"pose_{look:02}" / camera).mkdir(parents=True)
+                self.copy(look, camera, self.captures / f"pose_{look:02}" / camera / "white.png")
+        lines = [f"pose_{look:02}," + ",".join(f"{number:.6f}" for number in kuka(self.poses[look])) for look in looks]
+        (self.captures / "poses.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def from_files(self, *options):
+        done = slsctl("--json", "hand-eye", "--mounted", "arm", "--poses", "kuka", "--from", self.captures, "--config", self.service.file,
+                      "--looks", *options)
+        return done, [json.loads(line) for line in done.stdout.splitlines()]
+
+    def check_place(self):
+        file = self.captures / "hand_eye.yml"
+        place = matrix_of(file, "flange_from_rig_T") - FLANGE_FROM_RIG[:3, 3]
+        rotation = matrix_of(file, "flange_from_rig_R").reshape(3, 3).T @ FLANGE_FROM_RIG[:3, :3]
+        print(f"place off by {numpy.linalg.norm(place):.2f} mm, turn by {1000 * angle_of(rotation):.2f} mrad")
+        self.assertLess(numpy.linalg.norm(place), 1.5)
+        self.assertLess(angle_of(rotation), 1e-3)
+
+    def test_both_pictures_of_each_look_count(self):
+        self.kept_captures(*range(8))
+        done, told = self.from_files()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for look in told[:-1]:
+            self.assertEqual([each["name"] for each in look["cameras"]], ["camera", "right"])
+            points = [len(each["points_px"]) for each in look["cameras"]]
+            self.assertGreater(min(points), 15)
+            self.assertEqual(sum(points), look["corners"])
+            self.assertLess(look["error_px"], 0.2)
+        self.assertEqual(told[-1]["poses"], 8)
+        self.check_place()
+
+    def test_either_camera_alone_may_see_the_board(self):
+        self.kept_captures(*range(8))
+        for look, camera in ((1, "camera"), (2, "right"), (5, "camera"), (6, "camera"), (6, "right")):
+            (self.captures / f"pose_{look:02}" / camera / "white.png").unlink()
+            (self.captures / f"pose_{look:02}" / camera / "white.pgm").write_bytes(NOTHING)
+        done, told = self.from_files()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        seen = [[each["name"] for each in look.get("cameras", [])] for look in told[:-1]]
+        self.assertEqual(seen[1:3] + seen[5:7], [["right"], ["camera"], ["right"], []])
+        self.assertRegex(told[6]["unused"], ".+; .+")  # a reason of each camera
+        self.assertEqual(told[-1]["poses"], 7)
+        self.check_place()
+
+    def test_a_camera_that_is_not_calibrated_is_named(self):
+        self.kept_captures(*range(4))
+        (self.captures / "pose_02/right").rename(self.captures / "pose_02/left")
+        done, _ = self.from_files()
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("left: the calibration has no camera of this name", done.stdout + done.stderr)
+
+    def test_look_by_look_with_the_service(self):
+        for camera, folder in (("camera", "left"), ("right", "right")):
+            (self.service.folder / folder).mkdir()
+            for look in range(8):
+                self.copy(look, camera, self.service.folder / folder / f"{look:02}.png")
+        (self.service.folder / "right/03.png").unlink()
+        (self.service.folder / "right/03.pgm").write_bytes(NOTHING)
+        with self.service as service:
+            service.wait_ready()
+            for pose in self.poses:
+                numbers = ",".join(f"{number:.6f}" for number in kuka(pose))
+                done = slsctl("--json", "--socket", service.socket, "hand-eye", "--mounted", "arm", "--poses", "kuka", "--from", self.captures,
+                              f"--pose={numbers}")
+                self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(json.loads(done.stdout)["poses"], 8)
+        self.assertEqual(sorted(str(each.relative_to(self.captures)) for each in self.captures.glob("pose_03/*/*")),
+                         ["pose_03/camera/white.png", "pose_03/right/white.png"])
+        self.check_place()
+
+
 if __name__ == "__main__":
     unittest.main(verbosity=2)

@@ -93,6 +93,16 @@ std::vector<CapturedPose> list_subject(const path& folder, WhitePicture white, P
 
 }  // namespace
 
+Result<> check_camera_folders(const std::vector<std::string>& cameras) {
+  if (cameras.size() < 2) return {};
+  for (const std::string& name : cameras) {
+    if (name.find('/') == std::string::npos && name != "." && name != "..") continue;
+    return fail(ErrorCode::kInvalidArgument, "cannot be the name of a folder for its pictures: rename the camera",
+                "camera " + name);
+  }
+  return {};
+}
+
 std::string extension_of(const path& file) {
   std::string extension = file.extension().string();
   std::ranges::transform(extension, extension.begin(),

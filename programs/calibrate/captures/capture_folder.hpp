@@ -48,6 +48,10 @@ enum class WhitePicture { kNeeded, kOptional };
 [[nodiscard]] Result<std::vector<CapturedPose>> list_captures_with_planes(const std::filesystem::path& folder,
                                                                           bool knows_plane);
 
+/// Checks that pictures of several cameras can have folders of the cameras' names.
+/// @errors kInvalidArgument: names the camera
+[[nodiscard]] Result<> check_camera_folders(const std::vector<std::string>& cameras);
+
 /// The extension of a picture's file in lower case, because cameras also write .JPG.
 [[nodiscard]] std::string extension_of(const std::filesystem::path& file);
 

@@ -54,19 +54,10 @@ path free_name(const path& folder, PoseSubject subject) {
   }
 }
 
-bool may_be_a_folder(const std::string& name) {
-  return name.find('/') == std::string::npos && name != "." && name != "..";
-}
-
 }  // namespace
 
 Result<PoseRecorder> PoseRecorder::create(path folder, std::vector<std::string> cameras, const Pattern& pattern) {
-  for (const std::string& name : cameras) {
-    if (cameras.size() > 1 && !may_be_a_folder(name)) {
-      return fail(ErrorCode::kInvalidArgument, "cannot be the name of a folder for its pictures: rename the camera",
-                  "camera " + name);
-    }
-  }
+  if (auto fit = check_camera_folders(cameras); !fit) return tl::unexpected(fit.error());
   return PoseRecorder(std::move(folder), std::move(cameras), write_pattern(pattern));
 }
 

@@ -16,17 +16,17 @@ using testing::HasSubstr;
 
 class StillSource final : public PoseSource {
  public:
-  [[nodiscard]] const std::vector<std::string>& cameras() const override { return names_; }
+  [[nodiscard]] const std::vector<std::string>& cameras() const override { return names; }
   [[nodiscard]] ImageSize projector() const override { return {64, 40}; }
   void show(const Grey8& image) override { white_ = image.at(0, 0) == 255; }
   [[nodiscard]] Result<std::vector<GreyImage>> grab() override {
     if (fails || !white_) return fail(ErrorCode::kTimeout, "no frame");
-    return std::vector<GreyImage>{Grey8(32, 24, 200)};
+    return std::vector<GreyImage>(names.size(), Grey8(32, 24, 200));
   }
   bool fails = false;
+  std::vector<std::string> names{"camera"};
 
  private:
-  std::vector<std::string> names_{"camera"};
   bool white_ = false;
 };
 
@@ -67,6 +67,26 @@ TEST_F(TakeLook, IsDroppedWithoutATrace) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "pose_01"));
   ASSERT_TRUE(drop_look(folder_, *first));
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
+}
+
+TEST_F(TakeLook, OfSeveralCamerasHasAFolderForEach) {
+  source_.names = {"left", "right eye"};
+  ASSERT_TRUE(take({1, 2, 3, 40, 50, 60}));
+  EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "pose_00/left/white.png"));
+  EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "pose_00/right eye/white.png"));
+}
+
+TEST_F(TakeLook, RefusesACameraWhoseNameIsNoFolder) {
+  for (const char* name : {"../right", "a/b", "..", "."}) {
+    source_.names = {"left", name};
+    const auto wrong = take({1, 2, 3, 40, 50, 60});
+    ASSERT_FALSE(wrong) << name;
+    EXPECT_THAT(to_string(wrong.error()),
+                HasSubstr(std::string("camera ") + name + ": cannot be the name of a folder"));
+    EXPECT_FALSE(std::filesystem::exists(folder_));
+  }
+  source_.names = {"../right"};  // alone, its pictures need no folder of their own
+  EXPECT_TRUE(take({1, 2, 3, 40, 50, 60}));
 }
 
 TEST_F(TakeLook, ChangesNothingOnBadInput) {
