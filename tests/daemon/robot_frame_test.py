@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """Clouds in the robot's base, against a transform in numpy. The scene is a plane, and the same frame each time."""
+import json
 import pathlib
 import tempfile
 import unittest
@@ -166,7 +167,7 @@ class RobotFrame(unittest.TestCase):
             in_mm = [1000 * each for each in POSE_UR[:3]] + POSE_UR[3:]
             self.refused(client, "puts the flange 7.733e\\+05 mm", robot_pose=in_mm, poses="ur")
             self.refused(client, "quaternion has length", robot_pose=[400, 0, 300, 0.5, 0.5, 0.5, 0.9], poses="abb")
-            self.refused(client, "no poses come with a stream", "subscribe", coordinate_frame="robot_base")
+            self.refused(client, 'no poses come with a stream: ask for "coordinate_frame": "rig", or scan at each place with "robot_pose"', "subscribe", coordinate_frame="robot_base")
             client.call("subscribe", rate_hz=10)  # in the rig's frame
             wait_until(lambda: self.next_cloud(client), "a cloud")
             self.assertNotIn("base_from_rig", self.event)
@@ -200,8 +201,20 @@ class RobotFrame(unittest.TestCase):
                 client.call("set", cloud={"box": box, "box_frame": "robot_base"})
                 self.assertEqual(client.call("preview", timeout_ms=600000)[0]["points"], len(at))
                 if mounted == "arm":
-                    self.refused(client, "no poses come with a stream: .* box and plane are in the robot's base", "subscribe", coordinate_frame="rig")
+                    self.refused(client, "no poses come with a stream: .* box and plane are in the robot's base; set them with \"box_frame\": \"rig\", or scan at each place with \"robot_pose\"", "subscribe", coordinate_frame="rig")
+                    self.check_refused_while_it_runs(client, box)
                 self.assertEqual(client.call("scan", timeout_ms=600000, **pose)[0]["points"], numpy.count_nonzero(inside))
+
+    def check_refused_while_it_runs(self, client, box):
+        """A box in the base that is set later: the stream says so instead of a cloud, and goes on without it."""
+        client.call("set", cloud={"box": None, "box_frame": None})
+        client.call("subscribe", rate_hz=10, coordinate_frame="rig")
+        wait_until(lambda: self.next_cloud(client), "a cloud")
+        client.call("set", cloud={"box": box, "box_frame": "robot_base"})
+        told = []
+        wait_until(lambda: told.append(client.receive()[0]) or "error" in json.dumps(told[-1]), "an error")
+        self.assertIn("scan with the robot's pose, or set box_frame", json.dumps(told[-1]))
+        client.call("unsubscribe")
 
     def test_box_in_the_robots_base_needs_its_place(self):
         with Service() as service, service.client() as client:

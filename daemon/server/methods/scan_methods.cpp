@@ -164,7 +164,8 @@ std::optional<RpcError> refused_frame(WantedInBase wanted, const AskedPose& pose
   if (!on_arm(setup) || given) return std::nullopt;
   if (delivery == Delivery::kStream) {
     return invalid_params(fmt::format(
-        "the scanner is on the robot's arm, and no poses come with a stream: {} {}",
+        "the scanner is on the robot's arm, and no poses come with a stream: {} {}, or scan at each place with "
+        "\"robot_pose\"",
         wanted.cloud ? "ask for" : "[cloud] box and plane are in the robot's base; set them with", wanted.remedy()));
   }
   return invalid_params(
