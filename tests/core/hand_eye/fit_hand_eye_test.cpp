@@ -154,5 +154,31 @@ TEST(FitHandEye, IsMoreExactThanTheFiveMethodsOfOpenCv) {
   }
 }
 
+/// Median of the turn's error, degrees, if pictures, print and lens had no errors.
+double turn_by_perfect_pictures(Mounted mounted, const RobotNoise& noise) {
+  std::vector<double> turns;
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    SimulatedRobot robot;
+    robot.mounted = mounted, robot.noise = noise;
+    robot.corner_px = 1e-3, robot.print_scale = 1e-7, robot.focal_px = 1e-4;
+    const SimulatedSession simulated = simulate(robot, 3000 + seed);
+    turns.push_back(
+        off(fit_hand_eye(simulated.session).places.mount_from_rig, simulated.places.mount_from_rig).turn_degrees);
+  }
+  return median(turns);
+}
+
+TEST(FitHandEye, IsLimitedByTheRobotsOwnNoise) {
+  for (const Mounted mounted : {Mounted::kArm, Mounted::kCell}) {
+    for (const RobotNoise& noise : {kGoodRobot, kUsualRobot}) {
+      const double turn = turn_by_perfect_pictures(mounted, noise);
+      std::printf("%s, %.2f mm: turn by perfect pictures %.4f°\n", mounted == Mounted::kArm ? "arm" : "cell",
+                  noise.place_mm, turn);
+      EXPECT_GT(kDegreesOfRad * noise.turn_rad, turn);
+      EXPECT_GT(turn, 0.25 * kDegreesOfRad * noise.turn_rad);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace slsd
