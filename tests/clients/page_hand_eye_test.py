@@ -217,6 +217,34 @@ class Operator(HandEye):
             self.enter(browser, rows, notation="matrix")
             self.assertEqual(browser.run("return understandPose();"), [1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7, 0, 0, 0, 1])
 
+    def test_late_choices_of_before_leave_the_users_alone(self):
+        """The kept choices come after the user has made some: those stand, the others are placed."""
+        self.looks.mkdir()
+        kept = {"mounted": "cell", "poses": "fanuc", "board": "charuco-a3", "distance_mm": 500.0}
+        (self.looks / "choices.json").write_text(json.dumps(kept), encoding="utf-8")
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+            service.wait_ready()
+            browser.devtools("Page.addScriptToEvaluateOnNewDocument", source="""
+                const soon = window.fetch;
+                window.fetch = async (path, ...more) => {
+                  const answer = await soon(path, ...more);
+                  if (path === "api/hand_eye") await new Promise((pass) => { window.letPass = pass; });
+                  return answer;
+                };""")
+            self.open(browser, web, 1280, 900)
+            browser.wait("typeof letPass === 'function'", "the page does not ask")
+            values = """["mounted", "notation", "hand-eye-board", "hand-eye-distance", "hand-eye-measured"].map((id) => document.getElementById(id).value)"""
+            browser.run("""
+                for (const [id, value, kind] of [["notation", "kuka", "change"], ["hand-eye-distance", "777", "input"]]) {
+                  document.getElementById(id).value = value;
+                  document.getElementById(id).dispatchEvent(new Event(kind));
+                }
+                letPass();""")
+            browser.wait("handEyePlaced", "the kept choices do not come")
+            self.assertEqual(browser.run(f"return {values};"), ["cell", "kuka", "charuco-a3", "777", ""])
+            self.assertIn("KUKA", browser.run("return document.getElementById('notation').selectedOptions[0].textContent;"))
+            self.assertIn("on the arm", browser.run("return document.getElementById('mounting-help').textContent;"))
+
     def test_bad_input_is_named_and_keeps_nothing(self):
         late = self.cell.poses[3] @ robot.motion(robot.turn((1, 2, 0), 0.06), (25, -12, 8))  # the robot had not arrived
         with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:

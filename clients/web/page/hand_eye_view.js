@@ -24,7 +24,10 @@ const kMountingHelp = {
   arm: "Fasten the board in the cell, where the scanner on the arm can look at it from many sides.",
   cell: "Fasten the board on the arm; the scanner stands in the cell."};
 
+const kHandEyeChoices = ["mounted", "notation", "hand-eye-board", "hand-eye-ruler", "hand-eye-distance", "hand-eye-measured"];
+
 let handEye = null, handEyeText = "", handEyePlaced = false;
+const handEyeChosen = new Set();  // here, so the kept choices of before leave them alone
 
 const needsOf = (notation) => kNotations[notation][1].length + kNotations[notation][3].length;
 
@@ -164,9 +167,8 @@ function verdictLines({outcome, error}) {
 }
 
 function placeChoices({mounted, poses, board, ruler, distance_mm: distance, measured_mm: measured}) {
-  [$("mounted").value, $("notation").value] = [mounted, poses];
-  [$("hand-eye-board").value, $("hand-eye-ruler").value] = [board || "", ruler || ""];
-  [$("hand-eye-distance").value, $("hand-eye-measured").value] = [distance || "", (measured || []).join(", ")];
+  const kept = [mounted, poses, board || "", ruler || "", distance || "", (measured || []).join(", ")];
+  kHandEyeChoices.forEach((id, i) => { if (!handEyeChosen.has(id)) $(id).value = kept[i]; });
   showMounting();
 }
 
@@ -245,6 +247,8 @@ async function followHandEye() {
 
 function beginHandEye() {
   $("notation").replaceChildren(...Object.entries(kNotations).map(([name, [words]]) => Object.assign(element("option", words), {value: name})));
+  for (const id of kHandEyeChoices)
+    for (const kind of ["input", "change"]) $(id).addEventListener(kind, () => handEyeChosen.add(id));
   for (const id of ["mounted", "notation"]) $(id).addEventListener("change", showMounting);
   $("robot-pose").addEventListener("input", understandPose);
   $("robot-pose").addEventListener("keydown", (event) => {
