@@ -245,6 +245,41 @@ class Operator(HandEye):
             self.assertIn("KUKA", browser.run("return document.getElementById('notation').selectedOptions[0].textContent;"))
             self.assertIn("on the arm", browser.run("return document.getElementById('mounting-help').textContent;"))
 
+    def test_a_look_of_two_cameras_has_two_pictures(self):
+        folder = self.looks.parent / "of two"
+        subprocess.run([BIN / "make_looks", folder, "3", "2"], check=True, timeout=TIMEOUT_S)
+        rig_from_board = numpy.loadtxt(folder / "looks.csv", delimiter=",").reshape(-1, 4, 4)
+        seen = [(folder / f"pose_{i:02}/camera/white.png", folder / f"pose_{i:02}/right/white.png") for i in range(3)]
+        seen[2] = (self.cell.picture(None), seen[2][1])
+
+        def text(look):
+            words = robot.TWO_CAMERAS.format(folder=folder).replace("loop = false", "loop = true")
+            for name, picture in zip(("left", "right"), seen[look]):
+                words = words.replace(f'path = "{name}"', f'path = "{picture}"')
+            return words
+        with Service(configuration=text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+            service.wait_ready()
+            self.open(browser, web, 1280, 900)
+            for i, board in enumerate(rig_from_board):
+                service.configure(configuration=text(i))
+                service.stop()
+                service.start()
+                service.wait_ready()
+                self.take(browser, pasted(robot.BASE_FROM_BOARD @ numpy.linalg.inv(board) @ numpy.linalg.inv(robot.FLANGE_FROM_RIG)))
+                told = browser.run("return [...document.querySelectorAll('#hand-eye-pictures figcaption')].map((each) => each.textContent);")
+                self.assertEqual(len(told), 2)
+                for camera, words in zip(("camera", "right"), told):
+                    found = not (i == 2 and camera == "camera")
+                    self.assertRegex(words, rf"pose_{i:02}, camera {camera}: " + (r"\d\d points of the board" if found else "the board was not found"))
+                self.assertEqual(browser.run(GREEN) > 200, i < 2)
+            look = json.loads(web.get("/api/hand_eye")[2])["looks"]
+            self.assertTrue(look[0]["corners"] > 1.5 * look[2]["corners"])
+            self.picture(browser, "two", 1280)
+            browser.click("[data-look=pose_01] td:last-child button:last-child")
+            browser.click("[data-look=pose_01] td:last-child button:last-child")
+            browser.wait(f"{ROWS} === 2 && {STATE} === ''", "it is not deleted")
+            self.assertFalse((self.looks / "pose_01").exists())
+
     def test_bad_input_is_named_and_keeps_nothing(self):
         late = self.cell.poses[3] @ robot.motion(robot.turn((1, 2, 0), 0.06), (25, -12, 8))  # the robot had not arrived
         with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
