@@ -183,6 +183,7 @@ Cloud Scanner::scan(const ScanOptions& options) {
   json params{{"format", "ply"}, {"transport", "memfd"}, {"timeout_ms", options.timeout.count()}};
   if (!options.density.empty()) params["density"] = options.density;
   if (options.normals) params["normals"] = true;
+  if (options.colour) params["colour"] = true;
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;
   if (!options.preset.empty()) params["preset"] = options.preset;

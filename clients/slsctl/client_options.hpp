@@ -42,6 +42,7 @@ struct ClientOptions {
   std::optional<int> stride;                ///< scan
   bool normals = false;                     ///< scan: normals of pixels
   bool mesh = false;                        ///< scan: triangles of pixels
+  bool colour = false;                      ///< scan: colours from a frame in white light
   bool texture = false;                     ///< scan: intensities from a frame in white light
   bool ambient = false;                     ///< scan: minus the room's light
   bool as_shown = false;                    ///< frame: keep the projector's picture

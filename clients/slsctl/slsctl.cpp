@@ -100,6 +100,7 @@ void add_scan(CLI::App& app, ClientOptions& options) {
   notation->needs(pose);
   scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
   scan->add_flag("--mesh", options.mesh, "join the points (of pixels) to triangles; .stl, .obj and .glb always do");
+  scan->add_flag("--colour", options.colour, "also give the points their colour, from a frame in white light");
   scan->add_flag("--texture", options.texture, "also take a frame in white light, for the points' intensities");
   scan->add_flag("--ambient", options.ambient,
                  "also take a frame without the projector's light, and subtract the room's light");

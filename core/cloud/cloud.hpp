@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/image.hpp"
+
 namespace slsd {
 
 /// One measured symbol. Coordinates in the rig frame (that of the first camera), millimetres.
@@ -19,6 +21,7 @@ struct CloudPoint {
   std::uint8_t intensity = 0;
   std::uint8_t camera = 0;  ///< index in the calibration
   std::uint8_t symbol = 0;  ///< 1 to 25
+  Rgb colour{};             ///< of the surface under white light; meaningful if the cloud is coloured
   friend bool operator==(const CloudPoint&, const CloudPoint&) = default;
 };
 
@@ -30,6 +33,7 @@ struct Cloud {
   std::string scan_id;
   std::string time;         ///< ISO 8601, UTC; when the exposure began
   std::uint64_t frame = 0;  ///< sequence number of the first camera's frame
+  bool coloured = false;    ///< its points have colours, also in files
   /// One standard deviation of the depth, from the calibration's own uncertainty, if the calibration states it. This
   /// error moves the cloud as a whole, and no point relative to another.
   std::optional<float> sigma_calibration_mm;

@@ -61,18 +61,33 @@ std::string dense_ply_header(const DenseFacts& facts, std::size_t points) {
          std::to_string(facts.cameras) + "\nelement vertex " + std::to_string(points) +
          "\nproperty float x\nproperty float y\nproperty float z\nproperty float sigma_mm\nproperty uchar intensity\n"
          "property uchar camera\n" +
-         (facts.normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "") + "end_header\n";
+         (facts.normals ? "property float nx\nproperty float ny\nproperty float nz\n" : "") +
+         std::string(facts.coloured ? kPlyColourLines : "") + "end_header\n";
 }
 
 std::string dense_pcd_header(const DenseFacts& facts, int width, int height) {
-  const std::string fields =
-      facts.normals ? "FIELDS x y z sigma_mm intensity camera normal_x normal_y normal_z\nSIZE 4 4 4 4 4 1 4 4 4\n"
-                      "TYPE F F F F F U F F F\nCOUNT 1 1 1 1 1 1 1 1 1\n"
-                    : "FIELDS x y z sigma_mm intensity camera\nSIZE 4 4 4 4 4 1\nTYPE F F F F F U\nCOUNT 1 1 1 1 1 1\n";
+  std::string names = "FIELDS x y z sigma_mm intensity camera", sizes = "SIZE 4 4 4 4 4 1", types = "TYPE F F F F F U",
+              counts = "COUNT 1 1 1 1 1 1";
+  const auto add = [&](std::string_view name) {
+    names.append(" ").append(name);
+    sizes += " 4", types += " F", counts += " 1";
+  };
+  if (facts.normals)
+    for (const std::string_view axis : {"normal_x", "normal_y", "normal_z"}) add(axis);
+  if (facts.coloured) add(kPcdColour.name);
+  const std::string fields = names + "\n" + sizes + "\n" + types + "\n" + counts + "\n";
   return "# .PCD v0.7 - Point Cloud Data file format\n" + comments("# ", facts) + "VERSION 0.7\n" + fields + "WIDTH " +
          std::to_string(width) + "\nHEIGHT " + std::to_string(height) + "\n" + viewpoint_line(frame_of(facts)) +
          "POINTS " + std::to_string(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) +
          std::string(kDataBegins);
+}
+
+std::size_t dense_ply_bytes(bool normals, bool coloured) {
+  return kDensePlyBytes + (normals ? kDenseNormalBytes : 0) + (coloured ? kPlyColourBytes : 0);
+}
+
+std::size_t dense_pcd_bytes(bool normals, bool coloured) {
+  return kDensePcdBytes + (normals ? kDenseNormalBytes : 0) + (coloured ? kPcdColourBytes : 0);
 }
 
 Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals) {
@@ -80,7 +95,11 @@ Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals
   const int width = end == std::string_view::npos ? 0 : number_after(bytes.substr(0, end), "\nWIDTH ");
   if (width <= 0 || height <= 0)
     return fail(ErrorCode::kMalformed, "the cloud is no organised PCD: its header has no size");
-  DensePcd cloud(bytes.substr(end + kDataBegins.size()), width, height, normals);
+  const std::string_view fields = bytes.substr(0, end);
+  const std::size_t named = fields.find("\nFIELDS ");
+  const bool coloured = named != std::string_view::npos &&
+                        fields.substr(0, fields.find('\n', named + 1)).ends_with(" " + std::string(kPcdColour.name));
+  DensePcd cloud(bytes.substr(end + kDataBegins.size()), width, height, normals, coloured);
   cloud.base_from_rig_ = base_from_rig_of(bytes.substr(0, end));
   if (cloud.records_.size() / cloud.record_bytes() < cloud.pixels())
     return fail(ErrorCode::kMalformed, "the cloud has fewer points than its header says");
@@ -88,7 +107,7 @@ Result<DensePcd> DensePcd::open(std::string_view bytes, int height, bool normals
 }
 
 std::size_t DensePcd::record_bytes() const {
-  return kDensePcdBytes + (normals_ ? kDenseNormalBytes : 0);
+  return dense_pcd_bytes(normals_, coloured_);
 }
 
 std::size_t DensePcd::pixels() const {
@@ -106,18 +125,26 @@ Eigen::Vector3f DensePcd::in_rig(std::string_view record) const {
   return (base_from_rig_->inverse() * place.cast<double>()).cast<float>();
 }
 
+Rgb DensePcd::colour_of(std::string_view record) const {
+  const std::string_view bytes = record.substr(record.size() - kPcdColourBytes);
+  return {static_cast<std::uint8_t>(bytes[2]), static_cast<std::uint8_t>(bytes[1]),
+          static_cast<std::uint8_t>(bytes[0])};
+}
+
 std::string DensePcd::to_ply(const DenseFacts& facts) const {
   std::string points;
   std::size_t count = 0;
   DenseFacts all = facts;
   all.base_from_rig = base_from_rig_;
+  all.coloured = coloured_;
   for (std::size_t pixel = 0; pixel < pixels(); ++pixel) {
     const std::string_view from = record(pixel);
     all.cameras = std::max(all.cameras, std::size_t{static_cast<std::uint8_t>(from[kCameraAt])} + 1);
     if (!is_measured(from)) continue;
     points.append(from.substr(0, kIntensityAt));
     points += static_cast<char>(intensity_of(from));
-    points.append(from.substr(kCameraAt));
+    points.append(from.substr(kCameraAt, 1 + (normals_ ? kDenseNormalBytes : 0)));
+    if (coloured_) append_colour(colour_of(from), points);
     ++count;
   }
   return dense_ply_header(all, count) + points;
@@ -134,6 +161,7 @@ PointGrid DensePcd::grid() const {
     grid.sigma_mm[pixel] = float_at(from, kSigmaAt);
     grid.intensity[pixel] = intensity_of(from);
     grid.camera[pixel] = static_cast<std::uint8_t>(from[kCameraAt]);
+    if (coloured_) grid.colours.push_back(colour_of(from));
   }
   return grid;
 }

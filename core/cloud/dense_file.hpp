@@ -16,7 +16,7 @@
 namespace slsd {
 
 // Files of dense clouds, as in docs/formats.md: binary, little-endian. A record is x, y, z and sigma_mm as floats, the
-// intensity, the camera's index as a byte, and with normals three floats more.
+// intensity, the camera's index as a byte, with normals three floats more, and with colours those of point_record.hpp.
 
 inline constexpr std::size_t kDensePlyBytes = 18;     ///< of a record without a normal; the intensity is a byte
 inline constexpr std::size_t kDensePcdBytes = 21;     ///< the same in a PCD; the intensity is a float, which PCL needs
@@ -30,12 +30,17 @@ struct DenseFacts {
   std::size_t cameras = 1;
   bool normals = false;
   std::optional<RigidTransform> base_from_rig = {};  ///< the points are in the robot's base; empty: in the rig's frame
+  bool coloured = false;
 };
 
 /// @param points  number of records that follow
 [[nodiscard]] std::string dense_ply_header(const DenseFacts& facts, std::size_t points);
 /// @param width, height  size of the organised cloud; width * height records follow
 [[nodiscard]] std::string dense_pcd_header(const DenseFacts& facts, int width, int height);
+
+/// Bytes of a record of each format.
+[[nodiscard]] std::size_t dense_ply_bytes(bool normals, bool coloured);
+[[nodiscard]] std::size_t dense_pcd_bytes(bool normals, bool coloured);
 
 /// An organised cloud, read where it lies in memory.
 class DensePcd {
@@ -56,16 +61,17 @@ class DensePcd {
   [[nodiscard]] Cloud lattice(int step) const;
 
  private:
-  DensePcd(std::string_view records, int width, int height, bool normals)
-      : records_(records), width_(width), height_(height), normals_(normals) {}
+  DensePcd(std::string_view records, int width, int height, bool normals, bool coloured)
+      : records_(records), width_(width), height_(height), normals_(normals), coloured_(coloured) {}
   [[nodiscard]] std::size_t record_bytes() const;
   [[nodiscard]] std::size_t pixels() const;
   [[nodiscard]] std::string_view record(std::size_t pixel) const;
   [[nodiscard]] Eigen::Vector3f in_rig(std::string_view record) const;
+  [[nodiscard]] Rgb colour_of(std::string_view record) const;
 
   std::string_view records_;
   int width_, height_;
-  bool normals_;
+  bool normals_, coloured_;
   std::optional<RigidTransform> base_from_rig_;
 };
 

@@ -12,9 +12,10 @@ namespace slsd {
 namespace {
 
 template <class Value>
-std::string line_of_fields(std::string_view key, Value value) {
+std::string line_of_fields(std::string_view key, bool coloured, Value value) {
   std::string line(key);
   for (const PointField& field : kPointFields) line.append(" ").append(value(field));
+  if (coloured) line.append(" ").append(value(kPcdColour));
   return line + "\n";
 }
 
@@ -26,11 +27,13 @@ std::string header(const Cloud& cloud, const RigidTransform* base_from_rig) {
          header_text(cloud.time) + "\n# frame " + std::to_string(cloud.frame) +
          (cloud.sigma_calibration_mm ? "\n# sigma_calibration_mm " + sigma_calibration_text(cloud) : "") +
          "\n# units mm, px\n" + frame_lines("# ", base_from_rig) + "VERSION 0.7\n" +
-         line_of_fields("FIELDS", [](const PointField& field) { return std::string(field.name); }) +
-         line_of_fields("SIZE", [](const PointField& field) { return std::to_string(field.pcd_bytes); }) +
-         line_of_fields("TYPE", [](const PointField& field) { return std::string(1, field.pcd_type); }) +
-         line_of_fields("COUNT", [](const PointField&) { return std::string("1"); }) + "WIDTH " + width + "\nHEIGHT " +
-         height + "\n" + viewpoint_line(base_from_rig) + "POINTS " + points + "\nDATA binary\n";
+         line_of_fields("FIELDS", cloud.coloured, [](const PointField& field) { return std::string(field.name); }) +
+         line_of_fields("SIZE", cloud.coloured,
+                        [](const PointField& field) { return std::to_string(field.pcd_bytes); }) +
+         line_of_fields("TYPE", cloud.coloured,
+                        [](const PointField& field) { return std::string(1, field.pcd_type); }) +
+         line_of_fields("COUNT", cloud.coloured, [](const PointField&) { return std::string("1"); }) + "WIDTH " +
+         width + "\nHEIGHT " + height + "\n" + viewpoint_line(base_from_rig) + "POINTS " + points + "\nDATA binary\n";
 }
 
 CloudPoint no_point(int camera, int row, int column) {
@@ -67,9 +70,11 @@ std::vector<CloudPoint> organised(const Cloud& cloud) {
 std::string write_pcd(const Cloud& cloud, const RigidTransform* base_from_rig) {
   std::string bytes = header(cloud, base_from_rig);
   const std::vector<CloudPoint> cells = organised(cloud);
-  bytes.reserve(bytes.size() + cells.size() * kPcdPointBytes);
-  for (const CloudPoint& cell : cells)
+  bytes.reserve(bytes.size() + cells.size() * (kPcdPointBytes + (cloud.coloured ? kPcdColourBytes : 0)));
+  for (const CloudPoint& cell : cells) {
     append_pcd_point(base_from_rig == nullptr ? cell : moved(cell, *base_from_rig), bytes);
+    if (cloud.coloured) append_pcd_colour(cell.colour, bytes);
+  }
   return bytes;
 }
 

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 
 #include "core/cloud/coordinate_frame.hpp"
@@ -17,12 +18,17 @@ namespace {
 constexpr std::string_view kBegin = "ply\nformat binary_little_endian 1.0\n";
 constexpr std::string_view kUnits = "comment units mm, px\n";
 
-std::string property_lines() {
+std::string property_lines(bool coloured) {
   std::string lines;
   for (const PointField& field : kPointFields) {
     lines.append("property ").append(field.ply_type).append(" ").append(field.name).append("\n");
   }
+  if (coloured) lines += kPlyColourLines;
   return lines + "end_header\n";
+}
+
+std::size_t record_bytes(const Cloud& cloud) {
+  return kPointBytes + (cloud.coloured ? kPlyColourBytes : 0);
 }
 
 // Reads the header's lines one by one, and keeps the first unexpected one as the problem.
@@ -87,10 +93,12 @@ std::string write_ply(const Cloud& cloud, const RigidTransform* base_from_rig) {
   bytes += "comment lattice_rows " + std::to_string(cloud.lattice_rows) + "\n";
   bytes += "comment cameras " + std::to_string(cloud.cameras) + "\n";
   bytes += "element vertex " + std::to_string(cloud.points.size()) + "\n";
-  bytes += property_lines();
-  bytes.reserve(bytes.size() + cloud.points.size() * kPointBytes);
-  for (const CloudPoint& point : cloud.points)
+  bytes += property_lines(cloud.coloured);
+  bytes.reserve(bytes.size() + cloud.points.size() * record_bytes(cloud));
+  for (const CloudPoint& point : cloud.points) {
     append_point(base_from_rig == nullptr ? point : moved(point, *base_from_rig), bytes);
+    if (cloud.coloured) append_colour(point.colour, bytes);
+  }
   return bytes;
 }
 
@@ -110,18 +118,22 @@ Result<Cloud> read_ply(std::string_view bytes, std::string_view name) {
   cloud.lattice_rows = static_cast<int>(header.number("comment lattice_rows ", kMaxLattice));
   cloud.cameras = static_cast<int>(header.number("comment cameras ", 256));
   const std::uint64_t count = header.number("element vertex ", bytes.size());
-  header.expect(property_lines());
+  cloud.coloured = header.has(property_lines(true));
+  header.expect(property_lines(cloud.coloured));
   const std::string where(name);
   if (!header.problem().empty()) {
     return fail(ErrorCode::kMalformed, "is not a cloud of slsd: expected \"" + header.problem() + "\"", where);
   }
-  if (header.rest().size() != count * kPointBytes) {
+  const std::size_t stride = record_bytes(cloud);
+  if (header.rest().size() / stride != count || header.rest().size() % stride != 0) {
     return fail(ErrorCode::kMalformed, "is cut off or too long: expected " + std::to_string(count) + " points", where);
   }
   cloud.points.reserve(count);
   for (std::uint64_t i = 0; i < count; ++i) {
-    const auto point = read_point(header.rest().data() + i * kPointBytes);
+    const char* const record = header.rest().data() + i * stride;
+    auto point = read_point(record);
     if (!point) return fail(ErrorCode::kMalformed, "has no valid cell in point " + std::to_string(i), where);
+    if (cloud.coloured) std::memcpy(point->colour.data(), record + kPointBytes, kPlyColourBytes);
     cloud.points.push_back(base_from_rig ? moved(*point, base_from_rig->inverse()) : *point);
   }
   return cloud;

@@ -8,6 +8,8 @@
 
 #include <Eigen/Core>
 
+#include "core/image.hpp"
+
 namespace slsd {
 
 /// An organised cloud: a value for each camera pixel, row by row, several cameras one below the other. A pixel without
@@ -18,6 +20,7 @@ struct PointGrid {
   std::vector<float> sigma_mm;             ///< one standard deviation along the camera's ray
   std::vector<std::uint8_t> intensity;
   std::vector<std::uint8_t> camera;  ///< index in the calibration
+  std::vector<Rgb> colours;          ///< empty: the cloud has none
 
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);

@@ -60,6 +60,14 @@ void append_pcd_point(const CloudPoint& point, std::string& bytes) {
   append(point, static_cast<float>(point.intensity), bytes);
 }
 
+void append_colour(const Rgb& colour, std::string& bytes) {
+  bytes.append(reinterpret_cast<const char*>(colour.data()), colour.size());
+}
+
+void append_pcd_colour(const Rgb& colour, std::string& bytes) {
+  bytes.append({static_cast<char>(colour[2]), static_cast<char>(colour[1]), static_cast<char>(colour[0]), '\0'});
+}
+
 std::optional<CloudPoint> read_point(const char* bytes) {
   CloudPoint point;
   Cell cell{};

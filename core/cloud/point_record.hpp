@@ -35,6 +35,12 @@ inline constexpr std::array<PointField, 13> kPointFields{{{"x", "float", 4, 'F',
                                                           {"column", "int", 4, 'I', 4},
                                                           {"row", "int", 4, 'I', 4}}};
 
+/// The fields of a coloured cloud after these. In a PCD one field holds them, as PCL's PointXYZRGB has it: 0, red,
+/// green and blue, from the highest byte.
+inline constexpr std::string_view kPlyColourLines = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+inline constexpr PointField kPcdColour{"rgb", "", 0, 'F', 4};
+inline constexpr std::size_t kPlyColourBytes = 3, kPcdColourBytes = 4;
+
 /// Bytes of one point in a PLY: the fields in order, little endian, without padding.
 inline constexpr std::size_t kPointBytes = 43;
 /// Bytes of one point in a PCD, where intensity is a float: PCL's PointXYZI accepts nothing else.
@@ -45,6 +51,10 @@ void append_point(const CloudPoint& point, std::string& bytes);
 
 /// Appends the kPcdPointBytes of a point.
 void append_pcd_point(const CloudPoint& point, std::string& bytes);
+
+/// Appends the bytes of a colour in a PLY or PCD.
+void append_colour(const Rgb& colour, std::string& bytes);
+void append_pcd_colour(const Rgb& colour, std::string& bytes);
 
 /// Reads a point that append_point() wrote; empty if its cell is invalid.
 /// @param bytes  at least kPointBytes

@@ -2,25 +2,36 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <span>
 
 #include "core/cloud/cloud.hpp"
+#include "core/colour.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
 
 /// Frames of a camera without the pattern, with the size and depth of its other frames.
 struct SceneLight {
-  std::optional<GreyView> white;  ///< while the projector showed white
-  std::optional<GreyView> dark;   ///< while it showed black: the light of the room alone
-  double full = 255;              ///< the level of a saturated pixel
+  std::optional<GreyView> white;               ///< while the projector showed white
+  std::optional<GreyView> dark;                ///< while it showed black: the light of the room alone
+  double full = 255;                           ///< the level of a saturated pixel
+  const ColourFrame* white_colours = nullptr;  ///< colours of the white frame; null: the camera sees none
+  const ColourFrame* dark_colours = nullptr;
+  double colour_full = 255;  ///< the level of a saturated pixel in the colours
+  ColourGains gains{1, 1, 1};
 };
+
+/// The colour of a surface from its levels under white, minus those of the dark frame, times the gains, 0 to 255.
+[[nodiscard]] Rgb colour_of(const std::array<double, 3>& white, const std::array<double, 3>& dark,
+                            const SceneLight& light);
 
 /// Gives points the intensity of the white frame at their positions, minus the dark frame's, 0 to 255 of full. Without
 /// a white frame, it subtracts the dark level from the points' own intensity, which is the symbol's. If a white pixel
-/// around a point is saturated, only a lower bound is known, and the intensity is 255.
+/// around a point is saturated, only a lower bound is known, and the intensity is 255. With colours of the white frame,
+/// points get these likewise; without, their colour is the intensity.
 /// @param points  points of that camera alone, within its frame
 /// @return        number of saturated points
 /// @thread reentrant

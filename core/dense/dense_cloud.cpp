@@ -139,17 +139,28 @@ void put_point(char*& to, const DenseView& view, const RowPlaces& row, const Vie
   if (normals) put(to, points.normal(x, y));
 }
 
+/// A colour as a PCD has it.
+std::uint32_t packed(const Rgb& colour) {
+  return std::uint32_t{colour[0]} << 16 | std::uint32_t{colour[1]} << 8 | colour[2];
+}
+
+/// Tells whether a pixel of the image has a point.
+bool has_point(const DenseView& view, int x, int y) {
+  return x < view.map.width && view.map.measured(static_cast<std::size_t>(y) * view.map.width + x);
+}
+
+Rgb colour_at(const DenseView& view, int x, int y) {
+  return view.colours.empty() ? Rgb{} : view.colours[static_cast<std::size_t>(y) * view.map.width + x];
+}
+
 DenseFacts facts_of(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig) {
   return {cloud.scan_id,      cloud.time, cloud.frame,
-          cloud.views.size(), normals,    base_from_rig ? std::optional(*base_from_rig) : std::nullopt};
+          cloud.views.size(), normals,    base_from_rig ? std::optional(*base_from_rig) : std::nullopt,
+          cloud.coloured()};
 }
 
 RigidTransform file_from_camera(const DenseView& view, const RigidTransform* base_from_rig) {
   return base_from_rig == nullptr ? view.rig_from_camera : base_from_rig->after(view.rig_from_camera);
-}
-
-std::size_t bytes_of_point(std::size_t record, bool normals) {
-  return record + (normals ? kDenseNormalBytes : 0);
 }
 
 }  // namespace
@@ -160,13 +171,18 @@ std::size_t DenseCloud::points() const {
   return count;
 }
 
+bool DenseCloud::coloured() const {
+  return std::ranges::any_of(views, [](const DenseView& view) { return !view.colours.empty(); });
+}
+
 std::size_t DenseCloud::bytes() const {
   std::size_t bytes = 0;
-  for (const DenseView& view : views) bytes += view.map.pixels.size() * (2 * sizeof(float) + 2);
+  for (const DenseView& view : views)
+    bytes += view.map.pixels.size() * (2 * sizeof(float) + 2) + view.colours.size() * sizeof(Rgb);
   return bytes;
 }
 
-std::size_t shade_view(DenseView& view, const SceneLight& light) {
+std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured) {
   std::size_t saturated = 0;
   const auto level = [](const GreyView& frame, int x, int y) {
     return std::visit([&](const auto& pixels) { return static_cast<double>(pixels.at(x, y)); }, frame);
@@ -175,6 +191,12 @@ std::size_t shade_view(DenseView& view, const SceneLight& light) {
   // the light.
   constexpr int kSteps = 128, kPerUnit = 32;
   std::array<std::size_t, kSteps> ratios{};
+  view.colours.assign(coloured ? view.map.pixels.size() : 0, Rgb{});
+  const auto levels = [](const ColourFrame* colours, int x, int y) {
+    std::array<double, 3> levels{};
+    if (colours != nullptr) std::ranges::copy(colours->at(x, y), levels.begin());
+    return levels;
+  };
   for (int y = 0; y < view.map.height; ++y) {
     for (int x = 0; x < view.map.width; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * view.map.width + x;
@@ -186,7 +208,12 @@ std::size_t shade_view(DenseView& view, const SceneLight& light) {
       saturated += clipped;
       if (!clipped) ++ratios[std::min(kSteps - 1, static_cast<int>(kPerUnit * white / std::max(of_pattern, 1.0)))];
       const double share = clipped ? 1 : (white - dark) / light.full;
-      view.map.intensity[pixel] = static_cast<std::uint8_t>(std::lround(std::clamp(255 * share, 0.0, 255.0)));
+      const auto intensity = static_cast<std::uint8_t>(std::lround(std::clamp(255 * share, 0.0, 255.0)));
+      view.map.intensity[pixel] = intensity;
+      if (!coloured) continue;
+      view.colours[pixel] = light.white_colours == nullptr
+                                ? Rgb{intensity, intensity, intensity}
+                                : colour_of(levels(light.white_colours, x, y), levels(light.dark_colours, x, y), light);
     }
   }
   std::size_t all = 0, usual = 0;
@@ -205,19 +232,23 @@ std::size_t shade_view(DenseView& view, const SceneLight& light) {
 
 std::string write_dense_ply(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig) {
   std::string bytes = dense_ply_header(facts_of(cloud, normals, base_from_rig), cloud.points());
-  bytes.reserve(bytes.size() + cloud.points() * bytes_of_point(kDensePlyBytes, normals));
+  const bool coloured = cloud.coloured();
+  const std::size_t record = dense_ply_bytes(normals, coloured);
+  bytes.reserve(bytes.size() + cloud.points() * record);
   std::string row;
   for (const DenseView& view : cloud.views) {
     const RigidTransform place = file_from_camera(view, base_from_rig);
     const ViewPoints points(view, place);
     RowPlaces places(view, place);
-    row.resize(static_cast<std::size_t>(view.map.width) * bytes_of_point(kDensePlyBytes, normals));
+    row.resize(static_cast<std::size_t>(view.map.width) * record);
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
       char* to = row.data();
       for (int x = 0; x < view.map.width; ++x)
-        if (view.map.measured(static_cast<std::size_t>(y) * view.map.width + x))
+        if (has_point(view, x, y)) {
           put_point<std::uint8_t>(to, view, places, points, x, y, normals);
+          if (coloured) put(to, colour_at(view, x, y));
+        }
       bytes.append(row.data(), to);
     }
   }
@@ -229,7 +260,8 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTr
   for (const DenseView& view : cloud.views) width = std::max(width, view.map.width), height += view.map.height;
   std::string bytes = dense_pcd_header(facts_of(cloud, normals, base_from_rig), width, height);
   const std::size_t begin = bytes.size();
-  bytes.resize(begin + static_cast<std::size_t>(width) * height * bytes_of_point(kDensePcdBytes, normals));
+  const bool coloured = cloud.coloured();
+  bytes.resize(begin + static_cast<std::size_t>(width) * height * dense_pcd_bytes(normals, coloured));
   char* to = bytes.data() + begin;
   const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
   for (const DenseView& view : cloud.views) {
@@ -239,8 +271,9 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTr
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
       for (int x = 0; x < width; ++x) {
-        if (x < view.map.width && view.map.measured(static_cast<std::size_t>(y) * view.map.width + x)) {
+        if (has_point(view, x, y)) {
           put_point<float>(to, view, places, points, x, y, normals);
+          if (coloured) put(to, packed(colour_at(view, x, y)));
           continue;
         }
         put(to, none);
@@ -248,6 +281,7 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTr
         put(to, 0.0F);
         put(to, view.camera);
         if (normals) put(to, none);
+        if (coloured) put(to, packed(Rgb{}));
       }
     }
   }

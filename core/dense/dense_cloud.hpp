@@ -21,7 +21,8 @@ struct DenseView {
   RigidTransform rig_from_camera;
   std::uint8_t camera = 0;  ///< index in the calibration
   std::string camera_name;
-  float epipolar_px = 0;     ///< distance of the frame's pattern from its epipolar lines, projector px
+  float epipolar_px = 0;          ///< distance of the frame's pattern from its epipolar lines, projector px
+  std::vector<Rgb> colours = {};  ///< by pixel; empty: not wanted
   double white_differs = 0;  ///< share of the points at which the white frame differs from what the pattern's frame
                              ///< predicts
 };
@@ -34,13 +35,15 @@ struct DenseCloud {
   std::uint64_t frame = 0;  ///< sequence number of the first camera's frame
 
   [[nodiscard]] std::size_t points() const;
+  [[nodiscard]] bool coloured() const;
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 };
 
-/// Gives measured pixels the intensity of the white frame, as shade_points() does for symbols. Also counts pixels at
-/// which white differs from what the pattern's frame predicts, because something moved between the two.
+/// Gives measured pixels the intensity of the white frame, as shade_points() does for symbols, and their colour if it
+/// is wanted. Also counts pixels at which white differs from what the pattern's frame predicts, because something moved
+/// between the two.
 /// @return number of saturated pixels
-std::size_t shade_view(DenseView& view, const SceneLight& light);
+std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured = false);
 
 // Binary, little-endian; normals, which face the camera, add 12 bytes a point. Points are in the robot's base with
 // base_from_rig, else in the rig's frame.

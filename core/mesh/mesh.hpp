@@ -3,10 +3,13 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
+
+#include "core/image.hpp"
 
 namespace slsd {
 
@@ -17,7 +20,14 @@ struct Mesh {
   // For each vertex, or empty:
   std::vector<float> sigma_mm;          ///< one standard deviation
   std::vector<std::uint8_t> intensity;  ///< 0 to 255
+  std::vector<Rgb> colours;             ///< of the surface; if empty, files show the intensity in its place
   std::vector<std::uint16_t> frames;    ///< how many frames measured it
+
+  [[nodiscard]] bool shows_colour() const { return !colours.empty() || !intensity.empty(); }
+  /// The colour that files show of a vertex.
+  [[nodiscard]] Rgb shown_colour(std::size_t vertex) const {
+    return colours.empty() ? Rgb{intensity[vertex], intensity[vertex], intensity[vertex]} : colours[vertex];
+  }
 };
 
 }  // namespace slsd

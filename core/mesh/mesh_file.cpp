@@ -42,7 +42,7 @@ std::string write_ply_mesh(const Mesh& mesh, std::string_view title) {
                       "\ncomment units mm\nelement vertex " + std::to_string(mesh.vertices_mm.size()) +
                       "\nproperty float x\nproperty float y\nproperty float z\n";
   if (!mesh.sigma_mm.empty()) bytes += "property float sigma_mm\n";
-  if (!mesh.intensity.empty()) bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  if (mesh.shows_colour()) bytes += kPlyColourLines;
   if (!mesh.frames.empty()) bytes += "property ushort frames\n";
   bytes += "element face " + std::to_string(mesh.triangles.size()) +
            "\nproperty list uchar int vertex_indices\nend_header\n";
@@ -50,7 +50,7 @@ std::string write_ply_mesh(const Mesh& mesh, std::string_view title) {
   for (std::size_t i = 0; i < mesh.vertices_mm.size(); ++i) {
     put(bytes, mesh.vertices_mm[i]);
     if (!mesh.sigma_mm.empty()) put(bytes, mesh.sigma_mm[i]);
-    if (!mesh.intensity.empty()) bytes.append(3, static_cast<char>(mesh.intensity[i]));
+    if (mesh.shows_colour()) append_colour(mesh.shown_colour(i), bytes);
     if (!mesh.frames.empty()) put(bytes, mesh.frames[i]);
   }
   for (const Triangle& triangle : mesh.triangles) {
@@ -81,7 +81,8 @@ std::string write_obj(const Mesh& mesh, std::string_view title) {
     const Eigen::Vector3f& vertex = mesh.vertices_mm[i];
     fmt::format_to(end, "v {:.4f} {:.4f} {:.4f}", vertex.x(), vertex.y(), vertex.z());
     // Not in the format's first description, but MeshLab, Blender, CloudCompare and Open3D read it.
-    if (!mesh.intensity.empty()) fmt::format_to(end, " {0:.4f} {0:.4f} {0:.4f}", mesh.intensity[i] / 255.0);
+    if (mesh.shows_colour())
+      for (const std::uint8_t level : mesh.shown_colour(i)) fmt::format_to(end, " {:.4f}", level / 255.0);
     text += '\n';
   }
   for (const Triangle& triangle : mesh.triangles)
@@ -112,7 +113,7 @@ std::string gltf_description(const Mesh& mesh, std::string_view title, const Glb
   }
   std::string name = header_text(title);
   std::erase_if(name, [](char c) { return c == '"' || c == '\\' || static_cast<unsigned char>(c) > 0x7e; });
-  const bool coloured = !mesh.intensity.empty();
+  const bool coloured = mesh.shows_colour();
   const auto accessor = [](int view, int type, std::uint64_t count, const char* shape, const std::string& more) {
     return fmt::format(R"({{"bufferView":{},"componentType":{},"count":{},"type":"{}"{}}})", view, type, count, shape,
                        more);
@@ -154,7 +155,7 @@ std::string write_glb(const Mesh& mesh, std::string_view title) {
   bytes.append("glTF\2\0\0\0\0\0\0\0", 12);
   put(bytes, static_cast<std::uint32_t>(description.size()));
   bytes += "JSON" + description;
-  const std::uint64_t data = sizes.all() - (mesh.intensity.empty() ? sizes.colours : 0);
+  const std::uint64_t data = sizes.all() - (mesh.shows_colour() ? 0 : sizes.colours);
   put(bytes, static_cast<std::uint32_t>(data));
   bytes.append("BIN\0", 4);
   for (const Eigen::Vector3f& vertex : mesh.vertices_mm) put(bytes, gltf_place(vertex));
@@ -162,7 +163,10 @@ std::string write_glb(const Mesh& mesh, std::string_view title) {
     const Eigen::Vector3f unit = normal.squaredNorm() > 0 ? normal.normalized() : Eigen::Vector3f(0, 0, -1);
     put(bytes, Eigen::Vector3f(unit.x(), -unit.y(), -unit.z()));
   }
-  for (const std::uint8_t level : mesh.intensity) put(bytes, std::array<std::uint8_t, 4>{level, level, level, 255});
+  for (std::size_t i = 0; mesh.shows_colour() && i < mesh.vertices_mm.size(); ++i) {
+    append_colour(mesh.shown_colour(i), bytes);
+    bytes += '\xff';
+  }
   for (const Triangle& triangle : mesh.triangles) put(bytes, triangle);
   const auto length = static_cast<std::uint32_t>(bytes.size());
   std::memcpy(bytes.data() + 8, &length, sizeof length);

@@ -63,6 +63,7 @@ Mesh take_used(const PointGrid& grid, std::vector<Triangle> triangles) {
     mesh.vertices_mm.push_back(grid.points_mm[pixel]);
     mesh.sigma_mm.push_back(grid.sigma_mm[pixel]);
     mesh.intensity.push_back(grid.intensity[pixel]);
+    if (!grid.colours.empty()) mesh.colours.push_back(grid.colours[pixel]);
   }
   for (Triangle& triangle : triangles)
     for (std::uint32_t& corner : triangle) corner = vertex[corner];

@@ -112,6 +112,15 @@ void read_exposures(TableReader& reader, CameraOptions& options) {
   options.set_exposures(std::move(exposures_us));
 }
 
+void read_white_balance(TableReader& reader, CameraOptions& options) {
+  std::vector<double> gains(options.white_balance.begin(), options.white_balance.end());
+  reader.read("white_balance", gains);
+  if (gains.size() == options.white_balance.size())
+    std::ranges::copy(gains, options.white_balance.begin());
+  else
+    reader.refuse("white_balance", "must be three factors, of red, green and blue, as in [1.6, 1, 1.9]");
+}
+
 void refuse_keys_of_others(TableReader& reader, const toml::table& table, std::string_view driver) {
   const std::vector<std::string> own = reader.known();
   for (auto& [name, ignored] : drivers()) {
@@ -133,6 +142,7 @@ void read_keys(TableReader& reader, CameraOptions& options) {
   std::visit([&](auto& of_driver) { of_driver.name = name; }, options.of_driver);
   read_driver_keys(reader, options.of_driver);
   read_exposures(reader, options);
+  read_white_balance(reader, options);
   read_faults(reader, options);
 }
 

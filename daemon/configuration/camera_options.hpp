@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "core/colour.hpp"
 #include "core/result.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/fault.hpp"
@@ -30,6 +31,8 @@ struct CameraOptions {
   std::vector<Fault> faults;  ///< simulated faults, for tests of the code above the camera
   /// Two exposures of each picture, to be merged; the driver opens with the first. Empty: one exposure.
   std::vector<double> exposures_us = {};
+  /// Factors of the colours of clouds.
+  ColourGains white_balance = {1, 1, 1};
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::string_view driver() const;  ///< "file", "v4l2" or "aravis"

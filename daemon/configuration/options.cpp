@@ -48,6 +48,15 @@ Result<> check_exposures(const CameraOptions& camera) {
   return {};
 }
 
+constexpr double kGainMin = 0.1, kGainMax = 10;
+
+Result<> check_white_balance(const ColourGains& gains) {
+  for (const double gain : gains)
+    if (!(gain >= kGainMin && gain <= kGainMax))
+      return fail(ErrorCode::kInvalidArgument, "white_balance must be three factors of 0.1 to 10, as in [1.6, 1, 1.9]");
+  return {};
+}
+
 }  // namespace
 
 const std::string& CameraOptions::name() const {
@@ -94,6 +103,7 @@ Result<> CameraOptions::validate() const {
     return fail(ErrorCode::kInvalidArgument, "path must name an image or a folder of images for the driver \"file\"");
   }
   if (auto valid = check_exposures(*this); !valid) return valid;
+  if (auto valid = check_white_balance(white_balance); !valid) return valid;
   return std::visit([](const auto& options) { return options.validate(); }, of_driver);
 }
 

@@ -205,6 +205,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   for (const CameraOptions& camera : configuration.cameras) {
     setup.camera_names.push_back(camera.name());
     setup.camera_formats.push_back(camera.format());
+    setup.colour_gains.push_back(camera.white_balance);
   }
   setup.image = draw_pattern(setup.pattern);
   setup.decode = configuration.decode;

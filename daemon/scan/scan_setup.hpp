@@ -93,6 +93,7 @@ struct ScanSetup {
   std::vector<std::string> camera_names;    ///< names of the configured cameras
   std::vector<std::vector<Decoder>> lanes;  ///< by decoding thread, then by configured camera; none without calibration
   OtherHardware other_hardware = OtherHardware::kError;
+  std::vector<ColourGains> colour_gains = {};    ///< of the configured cameras; none: 1
   std::vector<std::string> camera_formats = {};  ///< configured formats, such as "Mono12"; an empty text if not set
   std::unique_ptr<FullLevels> full_levels = std::make_unique<FullLevels>();
   DecodeOptions decode = {};

@@ -17,6 +17,8 @@ ConfigurationTable every_camera() {
         "Two exposures of each picture, 1 to 1000000, the shorter first. slsd merges the frames: for still scenes with "
         "bright and dark parts. The longer one is 1.5 to 100 times as long. Replaces exposure_us. A camera of files "
         "replays its images as shorter and longer in turn."},
+       {{{"white_balance", "[1.0, 1.0, 1.0]"}},
+        "Factors of red, green and blue in clouds with colour, 0.1 to 10. docs/hardware.md tells how to measure them."},
        {{{"faults", "[]"}},
         "Faults to play in tests, as KIND@CAPTURE or KIND@CAPTURE:DURATION, such as "
         R"(["drop@3", "late@5:200ms", "disconnect@7:1.5s"]. The kinds are drop, tear, late, stale, stall, hang and )"

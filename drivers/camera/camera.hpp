@@ -82,8 +82,8 @@ class Camera {
   /// few periods, and for a triggered camera. @errors as capture()
   [[nodiscard]] virtual Result<Frame> capture_next(MonotonicTime deadline) { return capture(deadline); }
 
-  /// Sets the light of the next captures; the default is the pattern. A camera sees the light itself; a replay chooses
-  /// its images accordingly.
+  /// Sets the light of the next captures; the default is the pattern. A replay chooses its images accordingly. A camera
+  /// that sees colours adds them to its frames without the pattern.
   virtual void expect(Picture) {}
 
   /// Sets the exposure of the next captures of an open camera. They wait for frames that were exposed with it.

@@ -122,7 +122,9 @@ Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
   const GreyView pixels = view(**image);
   if (format_of(pixels) != pool_->format()) return fail_format(format_of(pixels));
   auto frame = pool_->lend(pixels, next_sequence_ - 1, exposure_start);
-  return frame ? Result<Frame>(std::move(*frame)) : fail_busy();
+  if (!frame) return fail_busy();
+  if (light_ == Picture::kPattern) return std::move(*frame);
+  return std::move(*frame).with_colours(folder_in_light().colours(index_in_light()));
 }
 
 Result<> FileCamera::set_exposure(double exposure_us) {
@@ -143,17 +145,21 @@ Result<const GreyImage*> FileCamera::next_image() {
   return folder_.image(patterns_++ % folder_.size());
 }
 
-// Chooses the image that belongs to the last pattern frame, and has the exposure.
+// The image that belongs to the last pattern frame, and has the exposure.
+std::size_t FileCamera::index_in_light() const {
+  const std::uint64_t set = (patterns_ == 0 ? 0 : patterns_ - 1) / exposures();
+  return (set * exposures() + exposure_) % folder_in_light().size();
+}
+
 Result<const GreyImage*> FileCamera::image_in_light() {
-  ImageFolder& folder = light_ == Picture::kWhite ? white_ : dark_;
+  ImageFolder& folder = folder_in_light();
   if (folder.size() == 0)
     return fail(ErrorCode::kNotFound,
                 "such frames need a folder \"" + std::string(light_name(light_)) +
                     "\" beside the images: add one, or scan without them",
                 options_.path.string());
   ++next_sequence_;
-  const std::uint64_t set = (patterns_ == 0 ? 0 : patterns_ - 1) / exposures();
-  return folder.image((set * exposures() + exposure_) % folder.size());
+  return folder.image(index_in_light());
 }
 
 tl::unexpected<Error> FileCamera::fail_late() const {

@@ -73,6 +73,9 @@ class FileCamera final : public Camera {
   [[nodiscard]] Result<> open_beside(const char* name, ImageFolder& folder);
   [[nodiscard]] Result<const GreyImage*> next_image();
   [[nodiscard]] Result<const GreyImage*> image_in_light();
+  [[nodiscard]] std::size_t index_in_light() const;
+  [[nodiscard]] ImageFolder& folder_in_light() { return light_ == Picture::kWhite ? white_ : dark_; }
+  [[nodiscard]] const ImageFolder& folder_in_light() const { return light_ == Picture::kWhite ? white_ : dark_; }
   [[nodiscard]] std::uint64_t exposures() const { return std::max<std::uint64_t>(options_.exposures_us.size(), 1); }
   [[nodiscard]] Result<> configure(const FrameFormat& format);
   [[nodiscard]] tl::unexpected<Error> fail_late() const;

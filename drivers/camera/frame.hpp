@@ -7,12 +7,15 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "core/colour.hpp"
 #include "core/image.hpp"
+#include "core/result.hpp"
 
 namespace slsd {
 
@@ -109,9 +112,18 @@ class Frame {
   [[nodiscard]] MonotonicTime exposure_start() const { return exposure_start_; }
   [[nodiscard]] MonotonicTime received() const { return received_; }
 
+  /// Converts the frame into colours. Empty: the camera sees none, or the projector showed the pattern.
+  /// @errors of read_image()
+  [[nodiscard]] Result<ColourFrame> colours() const { return read_colours_ ? read_colours_() : ColourFrame(); }
+  /// @param read  converts what it owns, because the driver gets its buffer back
+  [[nodiscard]] Frame with_colours(std::function<Result<ColourFrame>()> read) && {
+    read_colours_ = std::move(read);
+    return std::move(*this);
+  }
+
   /// The same lease with other times, for a driver that corrects them.
   [[nodiscard]] Frame restamped(MonotonicTime exposure_start, MonotonicTime received) && {
-    return {image_, sequence_, exposure_start, received, std::move(lease_)};
+    return Frame(image_, sequence_, exposure_start, received, std::move(lease_)).with_colours(std::move(read_colours_));
   }
 
  private:
@@ -120,6 +132,7 @@ class Frame {
   MonotonicTime exposure_start_;
   MonotonicTime received_;
   FrameLease lease_;
+  std::function<Result<ColourFrame>()> read_colours_;
 };
 
 }  // namespace slsd

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -28,6 +29,10 @@ class ImageFolder {
   /// The i-th image as currently on disk; valid until the next call.
   /// @errors as read_image(); kDisconnected if the folder itself, or the only image, is gone
   [[nodiscard]] Result<const GreyImage*> image(std::size_t i);
+  /// Reads the colours of the i-th image, as then on disk, whenever it is called: see read_colours().
+  [[nodiscard]] std::function<Result<ColourFrame>()> colours(std::size_t i) const {
+    return [path = images_[i].path, options = options_] { return read_colours(path, options); };
+  }
 
  private:
   /// Distinguishes a file from an earlier one at the same path.

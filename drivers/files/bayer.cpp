@@ -46,6 +46,31 @@ void binomial(const ImageView<T>& mosaic, Image<T>& grey, std::span<std::uint32_
 }
 
 template <class T>
+ColourFrame mean_colours(const ImageView<T>& mosaic, BayerPattern pattern) {
+  constexpr std::array<std::uint32_t, 3> kWeights{1, 2, 1}, kSums{4, 8, 4};
+  const std::string_view names = to_string(pattern);
+  std::array<std::size_t, 4> colour_at{};  // of the mosaic's first two pixels in its first two rows
+  for (std::size_t i = 0; i < colour_at.size(); ++i) colour_at[i] = std::string_view("RGB").find(names[i]);
+  ColourFrame colours(mosaic.width, mosaic.height);
+  for (int y = 0; y < mosaic.height; ++y) {
+    for (int x = 0; x < mosaic.width; ++x) {
+      std::array<std::uint32_t, 3> sums{};
+      for (int down = -1; down <= 1; ++down) {
+        const T* const row = mosaic.row(mirrored(y + down, mosaic.height));
+        for (int right = -1; right <= 1; ++right) {
+          const std::size_t place =
+              2 * static_cast<std::size_t>((y + down) & 1) + static_cast<std::size_t>((x + right) & 1);
+          sums[colour_at[place]] += kWeights[down + 1] * kWeights[right + 1] * row[mirrored(x + right, mosaic.width)];
+        }
+      }
+      for (std::size_t i = 0; i < sums.size(); ++i)
+        colours.at(x, y)[i] = static_cast<std::uint16_t>((sums[i] + kSums[i] / 2) / kSums[i]);
+    }
+  }
+  return colours;
+}
+
+template <class T>
 Image<T> binomial(const Image<T>& mosaic) {
   Image<T> grey(mosaic.width(), mosaic.height());
   std::vector<std::uint32_t> sums(static_cast<std::size_t>(mosaic.width()));
@@ -66,6 +91,10 @@ std::string_view to_string(BayerPattern pattern) {
   const auto* found =
       std::find_if(kNames.begin(), kNames.end(), [&](const auto& entry) { return entry.second == pattern; });
   return found->first;
+}
+
+ColourFrame colours_from_mosaic(const GreyView& mosaic, BayerPattern pattern) {
+  return std::visit([pattern](const auto& pixels) { return mean_colours(pixels, pattern); }, mosaic);
 }
 
 Grey8 grey_from_mosaic(const Grey8& mosaic) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 
+#include "core/colour.hpp"
 #include "core/image.hpp"
 
 namespace slsd {
@@ -32,6 +33,13 @@ enum class BayerPattern { kNone, kRggb, kBggr, kGrbg, kGbrg };
 /// @thread reentrant
 [[nodiscard]] Grey8 grey_from_mosaic(const Grey8& mosaic);
 [[nodiscard]] Grey16 grey_from_mosaic(const Grey16& mosaic);
+
+/// The colours of a mosaic, by the same kernel: each is the mean of its pixels within the kernel, by their weights. So
+/// the grey is (R + 2 G + B) / 4 of them, up to rounding.
+/// @param mosaic   at least 2x2 pixels
+/// @param pattern  not kNone
+/// @thread reentrant
+[[nodiscard]] ColourFrame colours_from_mosaic(const GreyView& mosaic, BayerPattern pattern);
 
 /// Converts into an existing image, without an allocation.
 /// @param grey  in the mosaic's size

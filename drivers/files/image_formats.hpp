@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
+#include "core/colour.hpp"
 #include "core/result.hpp"
 #include "drivers/files/grey_image.hpp"
 
@@ -14,18 +16,21 @@ namespace slsd {
 /// The image in a file's bytes. The errors below have no place, because the caller knows it.
 struct DecodedImage {
   GreyImage grey;
-  bool colour = false;  ///< the file had colours, so it is not a mosaic
+  bool colour = false;       ///< the file had colours, so it is not a mosaic
+  ColourFrame colours = {};  ///< if they are to be kept and the file has them
 };
+
+enum class KeepColours : bool { kNo, kYes };
 
 /// One function for each format; the bytes begin with that format's signature. A file that ends early, or is visibly
 /// damaged, is an error. The memory that its header requires is checked before allocation.
 /// @param limit_bytes  of decoded samples
 /// @errors kMalformed, kUnsupported, kInvalidArgument (larger than the limit)
 /// @thread reentrant
-[[nodiscard]] Result<DecodedImage> decode_png(std::string_view bytes, std::size_t limit_bytes);
-[[nodiscard]] Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes);
-[[nodiscard]] Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes);
-[[nodiscard]] Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes);
+[[nodiscard]] Result<DecodedImage> decode_png(std::string_view bytes, std::size_t limit_bytes, KeepColours keep);
+[[nodiscard]] Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes, KeepColours keep);
+[[nodiscard]] Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes, KeepColours keep);
+[[nodiscard]] Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes, KeepColours keep);
 
 /// The image's size and samples that a header declares.
 struct ImageLayout {
@@ -52,6 +57,33 @@ struct ImageLayout {
 /// rounding.
 void grey_row(const std::uint8_t* samples, int channels, std::uint8_t* grey, int width_px);
 void grey_row(const std::uint16_t* samples, int channels, std::uint16_t* grey, int width_px);
+
+/// An image while its rows are read.
+template <class T>
+class DecodedRows {
+ public:
+  DecodedRows(const ImageLayout& layout, KeepColours keep)
+      : channels_(layout.channels),
+        colour_(layout.colour()),
+        grey_(static_cast<int>(layout.width_px), static_cast<int>(layout.height_px)) {
+    if (colour_ && keep == KeepColours::kYes) colours_ = ColourFrame(grey_.width(), grey_.height());
+  }
+  [[nodiscard]] int height() const { return grey_.height(); }
+  /// @param samples  of a row, in the order of ImageLayout
+  void set_row(int y, const T* samples) {
+    grey_row(samples, channels_, grey_.row(y), grey_.width());
+    if (colours_.empty()) return;
+    for (int x = 0; x < grey_.width(); ++x, samples += channels_)
+      colours_.at(x, y) = {samples[0], samples[1], samples[2]};
+  }
+  [[nodiscard]] DecodedImage take() { return {std::move(grey_), colour_, std::move(colours_)}; }
+
+ private:
+  int channels_;
+  bool colour_;
+  Image<T> grey_;
+  ColourFrame colours_;
+};
 
 /// One message for all formats.
 [[nodiscard]] tl::unexpected<Error> fail_truncated(std::string_view format);

@@ -78,7 +78,7 @@ Result<> JpegDecoder::read_header() {
 }
 
 Result<> JpegDecoder::read_grey(Grey8& grey) {
-  if (!start()) return fail_with_message();
+  if (!start(JCS_GRAYSCALE)) return fail_with_message();
   const bool counted = ::jpeg_has_multiple_scans(&info_) == FALSE;
   const bool lacking = lacks_a_scan(info_);  // start() has read all scans if there are several
   const ScanBlocks blocks = counted ? count_blocks(info_, scan_) : ScanBlocks::kAgree;
@@ -87,6 +87,12 @@ Result<> JpegDecoder::read_grey(Grey8& grey) {
     return fail_damaged("it has more data than blocks, so an earlier part is missing");
   if (failure_.warning != 0) return fail_damaged(meaning_of(failure_.warning));
   if (blocks == ScanBlocks::kMissing || lacking) return fail_damaged(meaning_of(JWRN_HIT_MARKER));
+  return {};
+}
+
+Result<> JpegDecoder::read_colours(ColourFrame& colours) {
+  row_.resize(3 * static_cast<std::size_t>(colours.width()));
+  if (!start(JCS_RGB) || !read_rows(colours)) return fail_with_message();
   return {};
 }
 
@@ -101,9 +107,9 @@ bool JpegDecoder::parse_header() {
   return true;
 }
 
-bool JpegDecoder::start() {
+bool JpegDecoder::start(J_COLOR_SPACE colours) {
   if (setjmp(failure_.back) != 0) return false;
-  info_.out_color_space = JCS_GRAYSCALE;
+  info_.out_color_space = colours;
   info_.dct_method = JDCT_ISLOW;
   return ::jpeg_start_decompress(&info_) != FALSE;
 }
@@ -113,6 +119,18 @@ bool JpegDecoder::read_rows(Grey8& grey) {
   while (info_.output_scanline < info_.output_height) {
     JSAMPROW row = grey.row(static_cast<int>(info_.output_scanline));
     ::jpeg_read_scanlines(&info_, &row, 1);
+  }
+  ::jpeg_finish_decompress(&info_);
+  return true;
+}
+
+bool JpegDecoder::read_rows(ColourFrame& colours) {
+  if (setjmp(failure_.back) != 0) return false;
+  while (info_.output_scanline < info_.output_height) {
+    ColourLevels* const pixels = colours.row(static_cast<int>(info_.output_scanline));
+    JSAMPROW row = row_.data();
+    ::jpeg_read_scanlines(&info_, &row, 1);
+    for (int x = 0; x < colours.width(); ++x) pixels[x] = {row[3 * x], row[3 * x + 1], row[3 * x + 2]};
   }
   ::jpeg_finish_decompress(&info_);
   return true;

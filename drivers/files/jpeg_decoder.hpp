@@ -5,9 +5,11 @@
 #include <csetjmp>
 #include <cstdio>  // before jpeglib.h, which needs it
 #include <string_view>
+#include <vector>
 
 #include <jpeglib.h>
 
+#include "core/colour.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
 
@@ -37,6 +39,10 @@ class JpegDecoder {
   /// @param grey  in the image's size
   /// @errors kMalformed, kUnsupported
   [[nodiscard]] Result<> read_grey(Grey8& grey);
+  /// Reads the colours of an image that has some, after the header. Data that read_grey() accepts is whole.
+  /// @param colours  in the image's size
+  /// @errors kMalformed, kUnsupported
+  [[nodiscard]] Result<> read_colours(ColourFrame& colours);
 
  private:
   /// The target of libjpeg's long jumps for its own errors.
@@ -50,14 +56,16 @@ class JpegDecoder {
   [[noreturn]] static void leave(j_common_ptr info);
   static void note(j_common_ptr info, int level);
   bool parse_header();
-  bool start();
+  bool start(J_COLOR_SPACE colours);
   bool read_rows(Grey8& grey);
+  bool read_rows(ColourFrame& colours);
   [[nodiscard]] Result<> fail_with_message() const;
 
   std::string_view bytes_;
   std::string_view scan_;  ///< the bytes after the first scan's header
   Failure failure_{};
   jpeg_decompress_struct info_{};
+  std::vector<JSAMPLE> row_;  // red, green and blue of each pixel
 };
 
 }  // namespace slsd

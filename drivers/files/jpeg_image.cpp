@@ -15,7 +15,7 @@ tl::unexpected<Error> with_remedy(Error error) {
 
 }  // namespace
 
-Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes) {
+Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes, KeepColours keep) {
   constexpr double kRatioMax = 1200;  // a block of 64 samples needs at least one bit
   JpegDecoder decoder(bytes);
   if (auto header = decoder.read_header(); !header) return with_remedy(std::move(header.error()));
@@ -25,7 +25,14 @@ Result<DecodedImage> decode_jpeg(std::string_view bytes, std::size_t limit_bytes
   if (!checked) return tl::unexpected(std::move(checked.error()));
   Grey8 grey(decoder.width_px(), decoder.height_px());
   if (auto read = decoder.read_grey(grey); !read) return with_remedy(std::move(read.error()));
-  return DecodedImage{std::move(grey), decoder.colour()};
+  DecodedImage image{std::move(grey), decoder.colour()};
+  if (!image.colour || keep == KeepColours::kNo) return image;
+  JpegDecoder again(bytes);
+  image.colours = ColourFrame(decoder.width_px(), decoder.height_px());
+  auto read = again.read_header();
+  if (read) read = again.read_colours(image.colours);
+  if (!read) return with_remedy(std::move(read.error()));
+  return image;
 }
 
 }  // namespace slsd

@@ -115,7 +115,7 @@ Result<Grey8> decode_in_process(std::string_view png, int width_px, int height_p
 Result<Grey8> decode_projected(std::string_view png, int width_px, int height_px) {
   constexpr std::string_view kBegin = "\x89PNG\r\n\x1a\n";
   if (!png.starts_with(kBegin)) return fail(ErrorCode::kUnsupported, "the image is not a PNG file; convert it to one");
-  auto decoded = decode_png(png, kDecodedBytesMax);
+  auto decoded = decode_png(png, kDecodedBytesMax, KeepColours::kNo);
   if (!decoded) return tl::unexpected(decoded.error());
   auto* grey = std::get_if<Grey8>(&decoded->grey);
   if (grey == nullptr)

@@ -69,29 +69,28 @@ class PngReader {
 };
 
 template <class T>
-Result<DecodedImage> read_as(PngReader& reader, const ImageLayout& layout) {
+Result<DecodedImage> read_as(PngReader& reader, const ImageLayout& layout, KeepColours keep) {
   std::vector<T> samples(layout.row_samples() * layout.height_px);
   std::vector<png_bytep> rows(layout.height_px);
   for (std::size_t y = 0; y < rows.size(); ++y)
     rows[y] = reinterpret_cast<png_bytep>(samples.data() + y * layout.row_samples());
   if (!reader.read_pixels(rows.data())) return fail_truncated("PNG");
-  Image<T> grey(static_cast<int>(layout.width_px), static_cast<int>(layout.height_px));
-  for (int y = 0; y < grey.height(); ++y)
-    grey_row(samples.data() + y * layout.row_samples(), layout.channels, grey.row(y), grey.width());
-  return DecodedImage{std::move(grey), layout.colour()};
+  DecodedRows<T> image(layout, keep);
+  for (int y = 0; y < image.height(); ++y) image.set_row(y, samples.data() + y * layout.row_samples());
+  return image.take();
 }
 
 }  // namespace
 
-Result<DecodedImage> decode_png(std::string_view bytes, std::size_t limit_bytes) {
+Result<DecodedImage> decode_png(std::string_view bytes, std::size_t limit_bytes, KeepColours keep) {
   PngReader reader(bytes);
   if (!reader.read_header()) return fail_truncated("PNG");
   const ImageLayout layout = reader.layout();
   // A palette, or one bit per pixel, makes up to 24 samples from one byte.
   auto checked = check_layout("PNG", layout, bytes.size(), 24.0 * kDeflateRatioMax, limit_bytes);
   if (!checked) return tl::unexpected(std::move(checked.error()));
-  if (layout.bytes_per_channel == 2) return read_as<std::uint16_t>(reader, layout);
-  return read_as<std::uint8_t>(reader, layout);
+  if (layout.bytes_per_channel == 2) return read_as<std::uint16_t>(reader, layout, keep);
+  return read_as<std::uint8_t>(reader, layout, keep);
 }
 
 }  // namespace slsd

@@ -175,31 +175,31 @@ class Raster {
 };
 
 template <class T>
-Result<DecodedImage> read_as(const Header& header) {
+Result<DecodedImage> read_as(const Header& header, KeepColours keep) {
   const ImageLayout& layout = header.layout;
   auto raster = Raster::of(header);
   if (!raster) return tl::unexpected(std::move(raster.error()));
   std::vector<T> samples(layout.row_samples());
-  Image<T> grey(static_cast<int>(layout.width_px), static_cast<int>(layout.height_px));
-  for (int y = 0; y < grey.height(); ++y) {
+  DecodedRows<T> image(layout, keep);
+  for (int y = 0; y < image.height(); ++y) {
     if (auto read = raster->read_row(samples); !read) return tl::unexpected(std::move(read.error()));
-    grey_row(samples.data(), layout.channels, grey.row(y), grey.width());
+    image.set_row(y, samples.data());
   }
   if (auto finished = raster->finish(); !finished) return tl::unexpected(std::move(finished.error()));
-  return DecodedImage{std::move(grey), layout.colour()};
+  return image.take();
 }
 
 }  // namespace
 
-Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes) {
+Result<DecodedImage> decode_pnm(std::string_view bytes, std::size_t limit_bytes, KeepColours keep) {
   if (!is_kind(bytes)) return fail_variant("PNM", "a type other than P2, P3, P5 or P6");
   const auto header = read_header(bytes);
   if (!header) return fail_truncated(kFormat);
   // A plain number has at least a digit and a space, and may become two bytes.
   auto checked = check_layout(kFormat, header->layout, header->pixels.size(), header->plain ? 2.0 : 1.0, limit_bytes);
   if (!checked) return tl::unexpected(std::move(checked.error()));
-  if (header->layout.bytes_per_channel == 2) return read_as<std::uint16_t>(*header);
-  return read_as<std::uint8_t>(*header);
+  if (header->layout.bytes_per_channel == 2) return read_as<std::uint16_t>(*header, keep);
+  return read_as<std::uint8_t>(*header, keep);
 }
 
 }  // namespace slsd

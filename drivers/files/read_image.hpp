@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string_view>
 
+#include "core/colour.hpp"
 #include "core/result.hpp"
 #include "drivers/files/bayer.hpp"
 #include "drivers/files/grey_image.hpp"
@@ -28,6 +29,11 @@ struct ReadImageOptions {
 /// @thread reentrant
 [[nodiscard]] Result<GreyImage> decode_image(std::string_view bytes, std::string_view name,
                                              const ReadImageOptions& options = {});
+
+/// Reads the colours of an image file: its own, or those of a Bayer mosaic. Empty if it is grey.
+/// @errors as read_image()
+/// @thread reentrant
+[[nodiscard]] Result<ColourFrame> read_colours(const std::filesystem::path& path, const ReadImageOptions& options = {});
 
 /// Reads an image file. @errors as read_file() and decode_image() @thread reentrant
 [[nodiscard]] Result<GreyImage> read_image(const std::filesystem::path& path, const ReadImageOptions& options = {});

@@ -110,21 +110,21 @@ ImageLayout layout_of(const Tiff& tiff) {
 }
 
 template <class T>
-Result<DecodedImage> read_as(const Tiff& tiff, const ImageLayout& layout) {
+Result<DecodedImage> read_as(const Tiff& tiff, const ImageLayout& layout, KeepColours keep) {
   std::vector<T> samples(layout.row_samples());
   if (::TIFFScanlineSize64(tiff.get()) != samples.size() * sizeof(T)) return fail_truncated("TIFF");
-  Image<T> grey(static_cast<int>(layout.width_px), static_cast<int>(layout.height_px));
-  for (int y = 0; y < grey.height(); ++y) {
+  DecodedRows<T> image(layout, keep);
+  for (int y = 0; y < image.height(); ++y) {
     if (::TIFFReadScanline(tiff.get(), samples.data(), static_cast<std::uint32_t>(y), 0) != 1)
       return fail_truncated("TIFF");
-    grey_row(samples.data(), layout.channels, grey.row(y), grey.width());
+    image.set_row(y, samples.data());
   }
-  return DecodedImage{std::move(grey), layout.colour()};
+  return image.take();
 }
 
 }  // namespace
 
-Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes) {
+Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes, KeepColours keep) {
   Memory file{bytes};
   const Tiff tiff = open(file, limit_bytes);
   if (!tiff) return fail_truncated("TIFF");
@@ -133,8 +133,8 @@ Result<DecodedImage> decode_tiff(std::string_view bytes, std::size_t limit_bytes
   const bool compressed = tag(tiff, TIFFTAG_COMPRESSION) != COMPRESSION_NONE;
   auto checked = check_layout("TIFF", layout, bytes.size(), compressed ? kCompressionMax : 1.0, limit_bytes);
   if (!checked) return tl::unexpected(std::move(checked.error()));
-  if (layout.bytes_per_channel == 2) return read_as<std::uint16_t>(tiff, layout);
-  return read_as<std::uint8_t>(tiff, layout);
+  if (layout.bytes_per_channel == 2) return read_as<std::uint16_t>(tiff, layout, keep);
+  return read_as<std::uint8_t>(tiff, layout, keep);
 }
 
 }  // namespace slsd

@@ -40,7 +40,10 @@ std::string jpeg_bytes(const Grey8& image, const JpegKind& kind) {
   ::jpeg_start_compress(&encoder, TRUE);
   std::vector<JSAMPLE> row(static_cast<std::size_t>(kind.components) * image.width());
   for (int y = 0; y < image.height(); ++y) {
-    for (std::size_t i = 0; i < row.size(); ++i) row[i] = image.row(y)[i / kind.components];
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      const int share = kind.components == 3 ? kind.shares[i % 3] : 255;
+      row[i] = static_cast<JSAMPLE>(image.row(y)[i / kind.components] * share / 255);
+    }
     JSAMPROW rows = row.data();
     ::jpeg_write_scanlines(&encoder, &rows, 1);
   }

@@ -77,6 +77,14 @@ class Cloud:
         return normals
 
     @property
+    def colours(self) -> npt.NDArray[np.uint8] | None:
+        """Red, green and blue of each point, N x 3, 0 to 255, if the scan asked for them; else None."""
+        if "red" not in (self.points.dtype.names or ()):
+            return None
+        colours: npt.NDArray[np.uint8] = np.stack([self.points[name] for name in ("red", "green", "blue")], axis=1)
+        return colours
+
+    @property
     def sigma_calibration_mm(self) -> float | None:
         """The standard deviation of the depth from the calibration alone, which moves all points together."""
         value = self.description.get("sigma_calibration_mm", self.comments.get("sigma_calibration_mm"))

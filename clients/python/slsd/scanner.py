@@ -78,7 +78,8 @@ class Scanner:
         self._channel.close()
 
     def scan(self, *, timeout_s: float | None = 5.0, density: Density | None = None, normals: bool = False,
-             texture: bool = False, ambient: bool = False, picture: bool = False, camera: str | None = None,
+             texture: bool = False, colour: bool = False, ambient: bool = False, picture: bool = False,
+             camera: str | None = None,
              frames: bool = False, shared: bool = True, why: bool = False, preset: str | None = None,
              coordinate_frame: Literal["rig", "robot_base"] | None = None, robot_pose: Sequence[float] | None = None,
              poses: str | None = None, box: Sequence[float] | None = None, plane: Sequence[float] | None = None,
@@ -90,6 +91,7 @@ class Scanner:
                  configured
         normals  adds the normal of each point; needs pixels
         texture  measures the intensity of each point, with a second frame under white light
+        colour   measures its colour as well, with a camera that sees colours
         ambient  subtracts the light of the room, with a third frame
         picture  returns the frame with decoded symbols drawn in, as PNG, in `picture`
         camera   the camera of the picture; None: the first
@@ -110,7 +112,8 @@ class Scanner:
         stride   keeps the pixels of every Nth row and column
         """
         params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
-                         density=density, normals=normals, texture=texture, ambient=ambient, picture=picture,
+                         density=density, normals=normals, texture=texture, colour=colour, ambient=ambient,
+                         picture=picture,
                          camera=camera, frames="raw" if frames else None, why=why, coordinate_frame=coordinate_frame,
                          robot_pose=_numbers(robot_pose), poses=poses,
                          box=_numbers(box), plane=_numbers(plane), box_frame=box_frame, voxel_mm=voxel_mm, stride=stride)
@@ -124,7 +127,8 @@ class Scanner:
         return cloud
 
     def save(self, file: str | os.PathLike[str], *, timeout_s: float | None = 5.0, density: Density | None = None,
-             normals: bool = False, texture: bool = False, ambient: bool = False) -> dict[str, Any]:
+             normals: bool = False, texture: bool = False, colour: bool = False,
+             ambient: bool = False) -> dict[str, Any]:
         """Takes one scan into a file. Its name gives the format: .ply, .pcd, or with pixels .tiff (a depth map).
 
         file  the file to write; it appears whole or not at all
@@ -136,7 +140,7 @@ class Scanner:
         if kind is None:
             raise ValueError(f"{target}: the file of a cloud must end in {', '.join(_FILES)}")
         params = _params(format=kind, timeout_ms=_milliseconds(timeout_s), density=density, normals=normals,
-                         texture=texture, ambient=ambient)
+                         texture=texture, colour=colour, ambient=ambient)
         part = target.with_name(f".{target.name}.{secrets.token_hex(4)}")
         with open(part, "wb") as out:  # fails before the scan if the place cannot be written
             try:

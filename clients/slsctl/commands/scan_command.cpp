@@ -136,6 +136,7 @@ json scan_parameters(const ClientOptions& options, const std::string& density) {
   if (!options.coordinate_frame.empty()) params["coordinate_frame"] = options.coordinate_frame;
   if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose, params["poses"] = options.pose_notation;
   if (options.normals) params["normals"] = true;
+  if (options.colour) params["colour"] = true;
   if (options.texture) params["texture"] = true;
   if (options.ambient) params["ambient"] = true;
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;

@@ -3,6 +3,7 @@
 #include "daemon/scan/cloud/reconstruct.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -76,12 +77,36 @@ double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t ca
   return setup.full_level_of(camera, all);
 }
 
-SceneLight light_of(const FrameSet& set, std::size_t camera, double full) {
+/// The light of the scene as one camera sees it, with the colours that it refers to.
+struct SeenLight {
   SceneLight light;
-  if (!set.white.empty()) light.white = set.white[camera].image();
-  if (!set.dark.empty()) light.dark = set.dark[camera].image();
-  light.full = full;
-  return light;
+  ColourFrame white, dark;
+};
+
+Result<> add_colours(const FrameSet& set, const ScanSetup& setup, std::size_t camera, SeenLight& seen) {
+  const auto read = [camera](const std::vector<Frame>& frames, ColourFrame& colours) -> Result<> {
+    if (frames.empty()) return {};
+    auto converted = frames[camera].colours();
+    if (!converted) return tl::unexpected(std::move(converted.error()));
+    colours = std::move(*converted);
+    return {};
+  };
+  auto added = read(set.white, seen.white);
+  if (added) added = read(set.dark, seen.dark);
+  if (!added || seen.white.empty()) return added;
+  seen.light.white_colours = &seen.white;
+  if (!seen.dark.empty()) seen.light.dark_colours = &seen.dark;
+  if (camera < setup.colour_gains.size()) seen.light.gains = setup.colour_gains[camera];
+  seen.light.colour_full = set.is_merged(camera) ? setup.full_level_of(camera, {}) : seen.light.full;
+  return added;
+}
+
+// The light of one camera's frames. The object must not move, because the light refers to its colours.
+Result<> light_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera, bool coloured, SeenLight& seen) {
+  if (!set.white.empty()) seen.light.white = set.white[camera].image();
+  if (!set.dark.empty()) seen.light.dark = set.dark[camera].image();
+  seen.light.full = full_level_of(set, setup, camera);
+  return coloured ? add_colours(set, setup, camera, seen) : Result<>();
 }
 
 // Measures the light of one camera's points.
@@ -89,6 +114,15 @@ void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& re
   if (!light.white && !light.dark) return;
   const std::size_t saturated = shade_points(points, light);
   if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
+}
+
+/// The factors that make the mean colour of these points grey. Empty: the mean lacks a colour.
+std::optional<ColourGains> white_balance_of(std::span<const CloudPoint> points, const ColourGains& applied) {
+  ColourGains sums{};
+  for (const CloudPoint& point : points)
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += point.colour[i] / applied[i];
+  if (std::ranges::any_of(sums, [](double sum) { return sum <= 0; })) return std::nullopt;
+  return ColourGains{sums[1] / sums[0], 1, sums[1] / sums[2]};
 }
 
 /// Limits the next frame to the pixels that can see the box, if there is one.
@@ -105,11 +139,11 @@ void limit_to_box(const CloudPart& part, const ScanSetup& setup, Decoder& decode
 
 /// A point for each pixel of a camera, from the symbols of its frame.
 DenseView measure_pixels(const GreyView& frame, Decoder& decoder, DenseMapper& mapper, ScanSetup& setup,
-                         std::size_t camera, const SceneLight& light, bool next_of_stream, ScanResult& result) {
+                         std::size_t camera, const SceneLight& light, const ScanRequest& request, ScanResult& result) {
   DecodedSymbols symbols = decoder.symbols();
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may come from the quotient image
-  DenseMap& map = next_of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
-                                 : mapper.measure(frame, light.full, symbols, *setup.crew);
+  DenseMap& map = request.of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
+                                    : mapper.measure(frame, light.full, symbols, *setup.crew);
   DenseView view{std::exchange(map, setup.dense->spare_map()),
                  mapper.rays(),
                  setup.calibration->cameras[decoder.camera_index()].rig_from_camera,
@@ -117,7 +151,7 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, DenseMapper& m
                  setup.camera_names[camera],
                  mapper.epipolar_offset_px()};
   if (light.white || light.dark) {
-    const std::size_t saturated = shade_view(view, light);
+    const std::size_t saturated = shade_view(view, light, request.colour);
     if (light.white) result.dense_saturated = result.dense_saturated.value_or(0) + saturated;
   }
   return view;
@@ -146,12 +180,16 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   if (!wanted) return tl::unexpected(wanted.error());
   const CloudPart& part = *wanted;
   auto dense = request.formats.dense() ? setup.dense->cloud() : nullptr;
+  bool sees_colours = false;
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     clock.start();
     const auto begin = steady_clock::now();
     Decoder& decoder = setup.lanes[lane][i];
-    result.full_levels.push_back(full_level_of(set, setup, i));
-    const SceneLight light = light_of(set, i, result.full_levels.back());
+    SeenLight seen;
+    if (auto lit = light_of(set, setup, i, request.colour, seen); !lit) return tl::unexpected(std::move(lit.error()));
+    const SceneLight& light = seen.light;
+    sees_colours = sees_colours || light.white_colours != nullptr;
+    result.full_levels.push_back(light.full);
     DenseMapper* mapper =
         dense ? &setup.dense->of(lane, i, decoder, setup.pattern, *setup.calibration, setup.decode) : nullptr;
     limit_to_box(part, setup, decoder, mapper);
@@ -165,11 +203,14 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     if (!light.white) result.light.push_back({setup.camera_names[i], (*decoding)->light});
     const std::vector<CloudPoint> strays = stray_symbols(**decoding, decoder.camera_index());
     result.strays.insert(result.strays.end(), strays.begin(), strays.end());
-    shade(std::span(result.cloud.points).subspan(before), light, result);
+    const std::span points = std::span(result.cloud.points).subspan(before);
+    shade(points, light, result);
+    if (light.white_colours != nullptr)
+      if (const auto balance = white_balance_of(points, light.gains))
+        result.white_balance.push_back({setup.camera_names[i], *balance});
     if (dense) {
       const auto dense_begin = steady_clock::now();
-      dense->views.push_back(
-          measure_pixels(set.frames[i].image(), decoder, *mapper, setup, i, light, request.of_stream, result));
+      dense->views.push_back(measure_pixels(set.frames[i].image(), decoder, *mapper, setup, i, light, request, result));
       const auto took = steady_clock::now() - dense_begin;
       result.dense_time += took, result.decode_time += took;
     }
@@ -179,6 +220,11 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     if (!picture) return tl::unexpected(picture.error());
     result.picture_png = std::move(*picture);
   }
+  if (request.colour && !sees_colours)
+    return fail(
+        ErrorCode::kUnsupported,
+        "no camera gives colours: configure a format with colours, as \"BayerRG8\" or \"YUYV\", or scan without them");
+  result.cloud.coloured = request.colour;
   if (dense) {
     const auto dense_begin = steady_clock::now();
     keep_part(dense->views, part);

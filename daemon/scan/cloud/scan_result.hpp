@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/cloud/cloud.hpp"
+#include "core/colour.hpp"
 #include "core/decode/decoding.hpp"
 #include "daemon/configuration/cloud_options.hpp"
 #include "daemon/scan/cloud/cloud_files.hpp"
@@ -67,6 +68,12 @@ struct CameraLight {
   SymbolLight light;
 };
 
+/// A camera's white balance as a scan found it.
+struct CameraWhiteBalance {
+  std::string name;
+  ColourGains gains;  ///< factors that make the mean of the points grey; that of green is 1
+};
+
 /// The coding of the frames that are kept beside a cloud.
 enum class FrameCoding { kNone, kRaw, kPng };
 
@@ -76,6 +83,7 @@ struct ScanRequest {
   std::string camera;                       ///< the camera of the picture; empty: the first
   FrameCoding frames = FrameCoding::kNone;  ///< coding of the frames that come with the cloud
   bool texture = false;                     ///< intensities from frames in white light
+  bool colour = false;                      ///< colours too, from frames in white light; needs texture
   bool ambient = false;                     ///< minus the intensities under the room's light alone
   CloudFormats formats = {};                ///< formats for the cloud's files
   std::stop_token gone = {};                ///< requested when nobody waits for the outcome any more
@@ -115,8 +123,9 @@ struct ScanResult {
   CloudFiles files = {};                               ///< the cloud in the requested formats
   std::optional<RigidTransform> flange_from_rig = {};  ///< if the scanner is on the robot's arm, and this holds
   LostTries lost = {};
-  std::vector<MergedCamera> merged = {};              ///< one for each camera that takes two exposures
-  std::vector<CameraLight> light = {};                ///< one for each camera; none if a white frame was divided out
+  std::vector<MergedCamera> merged = {};               ///< one for each camera that takes two exposures
+  std::vector<CameraLight> light = {};                 ///< one for each camera; none if a white frame was divided out
+  std::vector<CameraWhiteBalance> white_balance = {};  ///< one for each camera whose points have colours, if requested
   std::vector<CloudPoint> strays;                     ///< symbols that a knocked rig has displaced: see stray_symbols()
   RegionCounts regions{};                             ///< regions of all cameras, by status
   RuleCounts rules{};                                 ///< the same regions, by the rule that decided

@@ -106,6 +106,8 @@ json scan_json(const ScanResult& scan, Density density) {
   }
   if (scan.flange_from_rig) result["flange_from_rig"] = matrix_json(*scan.flange_from_rig);
   if (!scan.light.empty()) result["light"] = light_json(scan.light);
+  for (const auto& [name, gains] : scan.white_balance)
+    result["white_balance"][name] = {rounded(gains[0]), rounded(gains[1]), rounded(gains[2])};
   if (!scan.merged.empty()) result["exposures"] = exposures_json(scan.merged);
   result["tries"] = scan.lost.count + 1;
   if (scan.lost.count > 0) {

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <asio/post.hpp>
 
+#include "core/cloud/dense_file.hpp"
 #include "core/geometry/robot_pose.hpp"
 #include "daemon/rpc/message.hpp"
 #include "daemon/rpc/param_reader.hpp"
@@ -56,8 +57,9 @@ constexpr std::size_t kPictureBytes = 3;  // per pixel: decoded symbols are draw
 std::size_t expected_bytes(const ServiceState& state, const ScanRequest& request, CloudForm form = {}) {
   std::size_t bytes = request.picture ? picture_bytes(state, request.camera, kPictureBytes) : 0;
   if (form.dense()) {
-    const std::size_t record = form.format == CloudFormat::kPcd ? 21U : 18U;
-    const std::size_t a_pixel = form.format == CloudFormat::kTiff ? 8U : record + (form.normals ? 12U : 0U);
+    const std::size_t record = form.format == CloudFormat::kPcd ? dense_pcd_bytes(form.normals, request.colour)
+                                                                : dense_ply_bytes(form.normals, request.colour);
+    const std::size_t a_pixel = form.format == CloudFormat::kTiff ? 8U : record;
     for (const DeviceStatus& camera : state.scanner.rig().camera_statuses())
       bytes += static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px) * a_pixel;
   }
@@ -252,13 +254,17 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
   asked.request.why = reader.boolean("why", false);
   asked.request.frames = asked.frames = frame_coding(reader.choice("frames", {"none", "raw", "png"}));
   asked.request.camera = reader.text("camera");
-  asked.request.texture = reader.boolean("texture", false);
+  asked.request.colour = reader.boolean("colour", false);
+  asked.request.texture = reader.boolean("texture", asked.request.colour);
   asked.request.ambient = reader.boolean("ambient", false);
   asked.request.formats = CloudFormats::only(asked.form);
   asked.request.gone = session.gone();
   asked.preset = reader.text("preset");
   const CloudOptions part = read_part(reader, state);
   if (auto error = reader.error()) return tl::unexpected(*error);
+  if (asked.request.colour && !asked.request.texture)
+    return tl::unexpected(
+        invalid_params("\"colour\" comes from the frame of \"texture\": leave out \"texture\": false"));
   if (auto valid = part.validate(); !valid)
     return tl::unexpected(invalid_params("\"" + valid.error().where + "\" " + valid.error().message));
   const WantedInBase in_base{asked.form.in_base, part.in_base()};

@@ -58,6 +58,7 @@ class AravisSession {
   [[nodiscard]] bool answers();
   /// @errors kDisconnected: the camera was lost between captures
   [[nodiscard]] Result<> check();
+  void expect(Picture light) { receiver_->expect(light); }
   /// Sets the exposure of the next triggers. @errors of configure_exposure()
   [[nodiscard]] Result<> set_exposure(double exposure_us);
   /// Abandons the device: the session's end will not stop it.

@@ -81,6 +81,11 @@ Result<GreyView> GreyConverter::convert_jpeg(std::span<const std::byte> bytes) {
   return view(grey_);
 }
 
+GreyView mosaic_view_of(std::span<const std::byte> bytes, const FrameLayout& layout) {
+  if (layout.mode.format.layout == GreyLayout::kMosaic8) return view_as<std::uint8_t>(bytes, layout);
+  return view_as<std::uint16_t>(bytes, layout);
+}
+
 GreyView view_of(std::span<const std::byte> bytes, const FrameLayout& layout) {
   if (layout.mode.format.layout == GreyLayout::kGrey8) return view_as<std::uint8_t>(bytes, layout);
   return view_as<std::uint16_t>(bytes, layout);

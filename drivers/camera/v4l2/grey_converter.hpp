@@ -35,6 +35,9 @@ class GreyConverter {
   std::vector<std::uint32_t> columns_;
 };
 
+/// A view of a buffer that holds a Bayer mosaic.
+[[nodiscard]] GreyView mosaic_view_of(std::span<const std::byte> bytes, const FrameLayout& layout);
+
 /// A view of a buffer that holds a grey image. @param bytes  aligned to two
 [[nodiscard]] GreyView view_of(std::span<const std::byte> bytes, const FrameLayout& layout);
 

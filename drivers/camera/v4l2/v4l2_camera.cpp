@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "drivers/camera/v4l2/v4l2_camera.hpp"
+#include "drivers/camera/v4l2/read_colours.hpp"
 
 #include <linux/videodev2.h>
 
@@ -313,7 +314,8 @@ Result<Frame> V4l2Camera::deliver(const v4l2_buffer& buffer, MonotonicTime expos
 }
 
 Result<Frame> V4l2Camera::convert(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received) {
-  const auto grey = converter_->convert(stream_->buffers().bytes(buffer.index).first(buffer.bytesused));
+  const auto bytes = stream_->buffers().bytes(buffer.index).first(buffer.bytesused);
+  const auto grey = converter_->convert(bytes);
   if (!grey) {
     ++counts_.torn;
     return lose(grey.error().code, 1, grey.error().message);
@@ -324,7 +326,9 @@ Result<Frame> V4l2Camera::convert(const v4l2_buffer& buffer, MonotonicTime expos
                      "all " + std::to_string(options_.frames_held_max) + " frames are held; release some first");
   ++next_sequence_;
   ++counts_.delivered;
-  return std::move(*frame).restamped(exposure_start, received);
+  Frame stamped = std::move(*frame).restamped(exposure_start, received);
+  if (light_ == Picture::kPattern) return stamped;
+  return std::move(stamped).with_colours(colours_later(bytes, layout_));
 }
 
 void V4l2Camera::tell_figures(std::vector<DriverFigure>& figures) const {

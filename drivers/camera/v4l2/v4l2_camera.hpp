@@ -50,6 +50,7 @@ class V4l2Camera final : public Camera {
   /// Frames that the driver dropped in between count as lost, and show as a gap in the numbers. If the previous frame
   /// is older than a few periods, works as capture().
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
+  void expect(Picture light) override { light_ = light; }
   /// Makes the next capture pass over the frames under way, and at least settle_frames.
   [[nodiscard]] Result<> set_exposure(double exposure_us) override;
   [[nodiscard]] Result<> check() override;
@@ -97,6 +98,7 @@ class V4l2Camera final : public Camera {
   std::optional<GreyConverter> converter_;
   std::optional<FramePool> pool_;
   FrameLayout layout_;
+  Picture light_ = Picture::kPattern;
   ExposureClock clock_;
   bool clock_warned_ = false;
   std::size_t held_max_ = 0;

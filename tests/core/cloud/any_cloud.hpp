@@ -8,7 +8,7 @@
 
 namespace slsd {
 
-/// A cloud with points on about half of its cells, from two cameras.
+/// A cloud with points on about half of its cells, from two cameras; a third of the seeds give colours.
 inline Cloud any_cloud(std::uint32_t seed, int columns, int rows) {
   std::mt19937 random(seed);
   const auto draw = [&random](double low, double high) {
@@ -21,6 +21,7 @@ inline Cloud any_cloud(std::uint32_t seed, int columns, int rows) {
   cloud.scan_id = "scan-" + std::to_string(seed);
   cloud.time = "2026-03-01T12:00:00.000Z";
   cloud.frame = random();
+  cloud.coloured = seed % 3 == 0;
   if (seed % 2 == 1) cloud.sigma_calibration_mm = draw(0, 2);
   for (int cell = 0; cell < columns * rows * 2; ++cell) {
     if (random() % 2 == 0) continue;
@@ -42,6 +43,8 @@ inline Cloud any_cloud(std::uint32_t seed, int columns, int rows) {
     point.camera = static_cast<std::uint8_t>(cell / columns / rows);
     point.symbol = static_cast<std::uint8_t>(1 + random() % 25);
     point.intensity = static_cast<std::uint8_t>(random() % 256);
+    if (cloud.coloured)
+      for (std::uint8_t& level : point.colour) level = static_cast<std::uint8_t>(random() % 256);
     cloud.points.push_back(point);
   }
   return cloud;

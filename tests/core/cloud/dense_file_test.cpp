@@ -81,6 +81,38 @@ TEST(DenseFile, BecomesThePlyOfTheSamePoints) {
   }
 }
 
+/// The same file with a colour for each pixel: 0, its number, 7.
+std::string coloured_pcd(bool normals) {
+  DenseFacts coloured = facts(normals);
+  coloured.coloured = true;
+  std::string bytes = dense_pcd_header(coloured, kWidth, kHeight);
+  for (int pixel = 0; pixel < kWidth * kHeight; ++pixel) {
+    put_record(bytes, pixel, normals, true);
+    put(bytes, static_cast<std::uint32_t>(pixel << 8 | 7));
+  }
+  return bytes;
+}
+
+TEST(DenseFile, KeepsTheColoursOfPixels) {
+  for (const bool normals : {false, true}) {
+    const std::string bytes = coloured_pcd(normals);
+    EXPECT_THAT(bytes,
+                HasSubstr(normals ? " normal_z rgb\nSIZE 4 4 4 4 4 1 4 4 4 4\n" : " camera rgb\nSIZE 4 4 4 4 4 1 4\n"));
+    const auto pixels = DensePcd::open(bytes, kHeight, normals);
+    ASSERT_TRUE(pixels.has_value()) << pixels.error().message;
+    const PointGrid grid = pixels->grid();
+    ASSERT_EQ(grid.colours.size(), 12u);
+    EXPECT_EQ(grid.colours[8], (Rgb{0, 8, 7}));
+    EXPECT_EQ(grid.camera[8], 1);
+    const std::string as_ply = pixels->to_ply(facts(normals));
+    EXPECT_THAT(as_ply, HasSubstr("\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n"));
+    EXPECT_EQ(as_ply.size() - as_ply.find("end_header\n") - 11, 7 * dense_ply_bytes(normals, true));
+    EXPECT_THAT(as_ply, EndsWith(std::string("\0\v\7", 3)));
+  }
+  const std::string plain = pcd(false);
+  EXPECT_TRUE(DensePcd::open(plain, kHeight, false)->grid().colours.empty());
+}
+
 TEST(DenseFile, HasAGridOfAllPixels) {
   for (const bool normals : {false, true}) {
     const std::string bytes = pcd(normals);

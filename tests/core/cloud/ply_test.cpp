@@ -13,7 +13,10 @@
 namespace slsd {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
+
+constexpr char kColourLines[] = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
 
 RC_GTEST_PROP(ReadPly, ReturnsWhatWasWritten, (std::uint32_t seed)) {
   const Cloud cloud = any_cloud(seed, *rc::gen::inRange(1, 20), *rc::gen::inRange(1, 20));
@@ -30,6 +33,17 @@ TEST(WritePly, SaysTheContract) {
                               "property float camera_u\nproperty float camera_v\nproperty float projector_u\n"
                               "property float projector_v\nproperty uchar camera\nproperty uchar symbol\n"
                               "property float sigma_mm\nproperty int column\nproperty int row\nend_header\n"));
+}
+
+TEST(WritePly, EndsRecordsWithTheColour) {
+  Cloud cloud = any_cloud(9, 3, 2);
+  cloud.points.resize(1);
+  cloud.points.front().colour = {1, 2, 3};
+  const std::string text = write_ply(cloud);
+  EXPECT_THAT(text, HasSubstr("\nproperty int row\n" + std::string(kColourLines) + "end_header\n"));
+  EXPECT_THAT(text, EndsWith("\1\2\3"));
+  cloud.coloured = false;
+  EXPECT_EQ(write_ply(cloud).size() + 3 + sizeof kColourLines - 1, text.size());
 }
 
 TEST(WritePly, KeepsAnIdFromBreakingTheHeader) {

@@ -46,6 +46,32 @@ TEST(ShadePoints, SubtractsTheLightOfTheRoom) {
   EXPECT_EQ(points[0].intensity, 0);
 }
 
+TEST(ShadePoints, TakesColoursBetweenPixelsLessThoseOfTheRoomTimesTheGains) {
+  const Grey8 white = slope<std::uint8_t>(1);
+  ColourFrame colours(8, 6), room(8, 6, {5, 0, 10});
+  for (int y = 0; y < 6; ++y)
+    for (int x = 0; x < 8; ++x)
+      colours.at(x, y) = {static_cast<std::uint16_t>(20 * x), static_cast<std::uint16_t>(20 * y), 200};
+  std::vector<CloudPoint> points{seen_at(3, 2), seen_at(3.5F, 2.25F)};
+  SceneLight light{.white = white.view(), .white_colours = &colours};
+  shade_points(points, light);
+  EXPECT_EQ(points[0].colour, (Rgb{60, 40, 200}));
+  EXPECT_EQ(points[1].colour, (Rgb{70, 45, 200}));
+  light.dark_colours = &room, light.gains = {1, 2, 1.5};
+  shade_points(points, light);
+  EXPECT_EQ(points[0].colour, (Rgb{55, 80, 255}));
+  light.colour_full = 1023;
+  shade_points(points, light);
+  EXPECT_EQ(points[0].colour, (Rgb{14, 20, 71}));
+}
+
+TEST(ShadePoints, TakesTheIntensityAsColourOfACameraWithoutColours) {
+  const Grey8 white = slope<std::uint8_t>(1);
+  std::vector<CloudPoint> points{seen_at(3, 2)};
+  shade_points(points, {white.view(), std::nullopt, 255});
+  EXPECT_EQ(points[0].colour, (Rgb{32, 32, 32}));
+}
+
 TEST(ShadePoints, SubtractsItFromTheSymbolsWithoutAWhiteFrame) {
   const Grey8 dark = slope<std::uint8_t>(1);
   std::vector<CloudPoint> points{seen_at(3, 2, 100), seen_at(3, 2, 10)};

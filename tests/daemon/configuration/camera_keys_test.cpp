@@ -59,6 +59,16 @@ TEST(ReadConfiguration, TakesTwoExposuresOfEveryDriver) {
   }
 }
 
+TEST(ReadConfiguration, TakesAWhiteBalanceOfThreeFactors) {
+  const auto with = [](const std::string& factors) {
+    return read("[[camera]]\npath = \"x\"\n" + (factors.empty() ? "" : "white_balance = " + factors + "\n"));
+  };
+  EXPECT_EQ(with("")->cameras.at(0).white_balance, (ColourGains{1, 1, 1}));
+  EXPECT_EQ(with("[1.6, 1, 1.9]")->cameras.at(0).white_balance, (ColourGains{1.6, 1, 1.9}));
+  for (const auto* wrong : {"[1.6, 1]", "[0, 1, 1]", "[1, 1, 11.0]", "[1, nan, 1]", "1.5", "[]"})
+    EXPECT_FALSE(with(wrong).has_value()) << wrong;
+}
+
 TEST(ReadConfiguration, TakesAGainOfV4l2InDecibels) {
   const auto configuration = read("[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\ngain_db = 6\n");
   ASSERT_TRUE(configuration) << to_string(configuration.error());

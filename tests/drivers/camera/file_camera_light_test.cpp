@@ -44,6 +44,23 @@ TEST_F(FileCameraInLightTest, ReplaysWhatBelongsToTheFrameOfThePattern) {
   }
 }
 
+TEST_F(FileCameraInLightTest, GivesColoursWithoutThePatternAlone) {
+  put("0.pgm", 0);
+  put("dark/0.pgm", 1);
+  const ColourImage white(12, 8, Rgb{1, 2, 3});
+  folder_.write("white/0.ppm", test::pnm_bytes(samples_of(white)));
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  for (const auto& [light, expected] :
+       {std::pair(Picture::kPattern, ColourFrame()), std::pair(Picture::kWhite, ColourFrame(12, 8, {1, 2, 3})),
+        std::pair(Picture::kBlack, ColourFrame())}) {
+    camera.expect(light);
+    const auto frame = camera.capture(far_away());
+    ASSERT_TRUE(frame) << to_string(frame.error());
+    EXPECT_EQ(frame->colours(), expected);
+  }
+}
+
 // Two exposures of each picture; a scan that ended after the first does not put them out of step.
 TEST_F(FileCameraInLightTest, ReplaysTheExposureThatIsSet) {
   for (const int i : {0, 1, 2, 3}) put("0" + std::to_string(i) + ".pgm", i);

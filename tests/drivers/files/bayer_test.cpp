@@ -109,6 +109,46 @@ RC_GTEST_PROP(GreyFromMosaic, EqualsThePlainConvolution, ()) {
   RC_ASSERT(grey_from_mosaic(mosaic) == plain);
 }
 
+/// An even colour, as each pattern sees it.
+Grey16 even_mosaic(BayerPattern pattern, const ColourLevels& colour) {
+  Grey16 mosaic(9, 8);
+  for (int y = 0; y < 8; ++y)
+    for (int x = 0; x < 9; ++x)
+      mosaic.at(x, y) = colour[std::string_view("RGB").find(to_string(pattern)[2 * (y % 2) + x % 2])];
+  return mosaic;
+}
+
+TEST(ColoursFromMosaic, AreEvenUpToTheEdgeInEveryPattern) {
+  const ColourLevels colour{4000, 900, 17};
+  for (const auto pattern : {BayerPattern::kRggb, BayerPattern::kBggr, BayerPattern::kGrbg, BayerPattern::kGbrg})
+    EXPECT_EQ(colours_from_mosaic(even_mosaic(pattern, colour).view(), pattern), ColourFrame(9, 8, colour));
+}
+
+RC_GTEST_PROP(ColoursFromMosaic, HaveTheGreyAsTheirMean, ()) {
+  const int width = *rc::gen::inRange(2, 20), height = *rc::gen::inRange(2, 20);
+  Grey16 mosaic(width, height);
+  for (std::size_t i = 0; i < mosaic.size(); ++i) mosaic.data()[i] = *rc::gen::arbitrary<std::uint16_t>();
+  const Grey16 grey = grey_from_mosaic(mosaic);
+  const ColourFrame colours = colours_from_mosaic(mosaic.view(), BayerPattern::kGrbg);
+  for (std::size_t i = 0; i < mosaic.size(); ++i) {
+    const auto& [red, green, blue] = colours.data()[i];
+    RC_ASSERT(std::abs((red + 2.0 * green + blue) / 4 - grey.data()[i]) <= 1);
+  }
+}
+
+TEST(ColoursFromMosaic, ResembleThoseOfOpenCv) {
+  Grey8 mosaic(64, 48);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x)
+      mosaic.at(x, y) = static_cast<std::uint8_t>(std::array{40 + 3 * x, 100 + y, 220 - 2 * x}[colour_at(x, y)]);
+  const ColourFrame colours = colours_from_mosaic(mosaic.view(), BayerPattern::kRggb);
+  cv::Mat expected;
+  cv::cvtColor(cv::Mat(48, 64, CV_8UC1, mosaic.data()), expected, cv::COLOR_BayerRGGB2RGB);
+  for (int y = 1; y < 47; ++y)
+    for (int x = 1; x < 63; ++x)
+      for (int i = 0; i < 3; ++i) EXPECT_NEAR(colours.at(x, y)[i], expected.at<cv::Vec3b>(y, x)[i], 2);
+}
+
 TEST(ParseBayerPattern, ReadsWhatToStringWrites) {
   for (const auto pattern :
        {BayerPattern::kNone, BayerPattern::kRggb, BayerPattern::kBggr, BayerPattern::kGrbg, BayerPattern::kGbrg})

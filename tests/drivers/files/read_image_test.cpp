@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include "drivers/files/read_image.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <tuple>
@@ -10,6 +11,7 @@
 #include <rapidcheck/gtest.h>
 #include <opencv2/imgproc.hpp>
 
+#include "tests/drivers/jpeg_bytes.hpp"
 #include "tests/drivers/plain_images.hpp"
 #include "tests/drivers/temporary_folder.hpp"
 
@@ -89,6 +91,44 @@ TEST(DecodeImage, TurnsDeepColourIntoDeepGrey) {
   grey.at(1, 0) = 1815;  // 0.299 * 1000 + 0.587 * 2000 + 0.114 * 3000
   for (const std::string& file : {test::pnm_bytes(samples), test::png_bytes(samples), test::tiff_bytes(samples, true)})
     EXPECT_EQ(decode_image(file, "file"), GreyImage(grey));
+}
+
+/// Levels of an image's colours.
+ColourFrame levels_of(const ColourImage& image) {
+  ColourFrame levels(image.width(), image.height());
+  for (std::size_t i = 0; i < image.size(); ++i) std::ranges::copy(image.data()[i], levels.data()[i].begin());
+  return levels;
+}
+
+TEST(ReadColours, GivesThoseOfEveryFormat) {
+  const test::TemporaryFolder folder;
+  const Samples samples = samples_of(colours()), deep{2, 1, 3, 16, {65535, 65535, 65535, 1000, 2000, 3000}};
+  for (const std::string& file : {test::pnm_bytes(samples), test::plain_pnm_bytes(samples), test::png_bytes(samples),
+                                  test::tiff_bytes(samples, false), test::tiff_bytes(samples, true)})
+    EXPECT_EQ(read_colours(folder.write("colours", file)), levels_of(colours()));
+  for (const std::string& file : {test::pnm_bytes(deep), test::png_bytes(deep), test::tiff_bytes(deep, true)})
+    EXPECT_EQ(read_colours(folder.write("deep", file))->at(1, 0), (ColourLevels{1000, 2000, 3000}));
+}
+
+TEST(ReadColours, GivesThoseOfAJpeg) {
+  const test::TemporaryFolder folder;
+  const std::string jpeg = test::jpeg_bytes(Grey8(64, 48, 200), {.shares = {255, 128, 64}});
+  const auto read = read_colours(folder.write("colours.jpg", jpeg));
+  ASSERT_TRUE(read) << to_string(read.error());
+  ASSERT_EQ(read->size(), 64u * 48);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) {
+      EXPECT_NEAR(read->at(x, y)[0], 200, 3);
+      EXPECT_NEAR(read->at(x, y)[1], 100, 3);
+      EXPECT_NEAR(read->at(x, y)[2], 50, 3);
+    }
+}
+
+TEST(ReadColours, GivesNoneOfAGreyImage) {
+  const test::TemporaryFolder folder;
+  const Samples samples = samples_of(random_image<std::uint8_t>());
+  EXPECT_TRUE(read_colours(folder.write("grey.png", test::png_bytes(samples)))->empty());
+  EXPECT_FALSE(read_colours(folder.write("none.png", "")).has_value());
 }
 
 TEST(DecodeImage, IgnoresTransparency) {

@@ -114,7 +114,7 @@ class Cloud {
   [[nodiscard]] Iterator end() const { return {*this, size_}; }
 
   /// The records' fields. Clouds of symbols also have camera_u camera_v projector_u projector_v (px), symbol, column,
-  /// row; clouds with normals have nx ny nz.
+  /// row; clouds with normals have nx ny nz; coloured ones have red green blue (bytes).
   [[nodiscard]] const std::vector<Field>& fields() const { return fields_; }
   [[nodiscard]] bool has(std::string_view field) const { return find(field) != nullptr; }
 

@@ -19,6 +19,7 @@ struct ScanOptions {
   std::chrono::milliseconds timeout{5000};  ///< limit for devices and frames
   std::string density;                      ///< "symbols" or "pixels"; empty: as configured
   bool normals = false;                     ///< normals for the points of pixels
+  bool colour = false;                      ///< the colour of each point, from a second frame in white light
   bool texture = false;                     ///< the intensity of each point, from a second frame in white light
   bool ambient = false;                     ///< minus the room's light, from a third frame
   bool picture = false;                     ///< the frame with the decoded symbols drawn in

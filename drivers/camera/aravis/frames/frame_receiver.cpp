@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <memory>
 #include <mutex>
 #include <utility>
 #include <variant>
 
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/files/bayer.hpp"
+#include "drivers/files/grey_image.hpp"
 
 namespace slsd {
 namespace {
@@ -286,10 +288,18 @@ Result<std::optional<Frame>> FrameReceiver::deliver(ArvBuffer* buffer, Monotonic
     return std::make_optional<Frame>(view(buffer), sequence, start, there, buffers_.lend(buffer));
   }
   auto grey = as_grey(buffer, start);
+  if (grey && layout_.pixels.mosaic && light_ != Picture::kPattern)
+    grey = std::move(*grey).with_colours(colours_later(view(buffer)));
   buffers_.return_unread(buffer);
   if (!grey) return fail(ErrorCode::kBusy, "all frames are held; release some first", options_.name);
   ++counted_.delivered;
   return std::move(*grey).restamped(start, there);
+}
+
+std::function<Result<ColourFrame>()> FrameReceiver::colours_later(const GreyView& mosaic) const {
+  return [copy = std::make_shared<const GreyImage>(copy_of(mosaic)), bayer = layout_.pixels.bayer()]() {
+    return Result<ColourFrame>(colours_from_mosaic(slsd::view(*copy), bayer));
+  };
 }
 
 GreyView FrameReceiver::view(ArvBuffer* buffer) const {

@@ -5,14 +5,17 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/colour.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
+#include "core/shown_picture.hpp"
 #include "drivers/camera/aravis/aravis_camera_options.hpp"
 #include "drivers/camera/aravis/device/configure_device.hpp"
 #include "drivers/camera/aravis/device/device_clock.hpp"
@@ -64,6 +67,9 @@ class FrameReceiver {
 
   [[nodiscard]] bool all_held() const { return buffers_.lent() >= options_.frames_held_max; }
 
+  /// Frames without the pattern come with the colours of a mosaic.
+  void expect(Picture light) { light_ = light; }
+
   /// The evidence that a frame was exposed after the request.
   struct Proof {
     MonotonicTime asked;  ///< frames exposed earlier are stale
@@ -104,10 +110,12 @@ class FrameReceiver {
   [[nodiscard]] std::optional<MonotonicTime> start_by_arrival(MonotonicTime there, const Proof& proof) const;
   [[nodiscard]] Result<std::optional<Frame>> deliver(ArvBuffer* buffer, MonotonicTime exposure_start);
   [[nodiscard]] GreyView view(ArvBuffer* buffer) const;
+  [[nodiscard]] std::function<Result<ColourFrame>()> colours_later(const GreyView& mosaic) const;
   [[nodiscard]] std::optional<Frame> as_grey(ArvBuffer* buffer, MonotonicTime exposure_start);
 
   ArvStream* stream_;
   DeviceLayout layout_;
+  Picture light_ = Picture::kPattern;
   const AravisCameraOptions& options_;
   StreamBuffers buffers_;
   std::unique_ptr<ChunkReader> chunks_;  ///< must end before the buffers

@@ -82,6 +82,13 @@ void unpack_pixels(std::span<const std::uint8_t> packed, PixelPacking packing, G
   }
 }
 
+BayerPattern PixelLayout::bayer() const {
+  if (name.starts_with("BayerRG")) return BayerPattern::kRggb;
+  if (name.starts_with("BayerBG")) return BayerPattern::kBggr;
+  if (name.starts_with("BayerGR")) return BayerPattern::kGrbg;
+  return name.starts_with("BayerGB") ? BayerPattern::kGbrg : BayerPattern::kNone;
+}
+
 std::optional<PixelLayout> find_pixel_layout(std::string_view name) {
   const auto* found = std::ranges::find(kLayouts, name, &PixelLayout::name);
   if (found == kLayouts.end()) return std::nullopt;

@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "core/image.hpp"
+#include "drivers/files/bayer.hpp"
 
 namespace slsd {
 
@@ -42,6 +43,8 @@ struct PixelLayout {
   bool mosaic = false;      ///< a Bayer mosaic, which is converted to grey
   PixelPacking packing = PixelPacking::kNone;
 
+  /// The pattern of a mosaic, by its name: "BayerRG8" begins with red and green.
+  [[nodiscard]] BayerPattern bayer() const;
   /// The bits of a pixel during transfer.
   [[nodiscard]] int bits_per_pixel() const { return static_cast<int>(code >> 16 & 0xff); }
   /// Tells whether frames are views of the stream's own buffers.

@@ -154,6 +154,24 @@ TEST_F(AravisCameraTest, TurnsAMosaicIntoGrey) {
   EXPECT_EQ(std::count(grey.pixels, grey.pixels + 64 * 48, 77), 64 * 48);
 }
 
+TEST_F(AravisCameraTest, GivesTheColoursOfAMosaicWithoutThePattern) {
+  Grey8 mosaic(64, 48);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) mosaic.at(x, y) = static_cast<std::uint8_t>(40 * (1 + x % 2 + y % 2));
+  test::GigeCameraOptions even;
+  even.frames = test::replayed_images({mosaic});
+  test::GigeCamera device(even);
+  AravisCameraOptions options = options_for(device);
+  options.pixel_format = "BayerRG8";
+  AravisCamera camera(options);
+  ASSERT_TRUE(opens(camera));
+  EXPECT_TRUE(camera.capture(far_away())->colours()->empty());
+  camera.expect(Picture::kWhite);
+  const auto frame = camera.capture(far_away());
+  ASSERT_TRUE(frame);
+  EXPECT_EQ(frame->colours(), ColourFrame(64, 48, {40, 80, 120}));
+}
+
 TEST_F(AravisCameraTest, ExposesAtALine) {
   AravisCameraOptions options = options_for(device_);
   options.trigger = AravisTrigger::kLine;
