@@ -76,7 +76,8 @@ Result<LiveClouds> LiveClouds::open(const path& socket, const std::optional<path
 }
 
 Result<> LiveClouds::request() {
-  return connection_.request("scan", {{"format", "ply"}, {"density", "pixels"}, {"coordinate_frame", "rig"}});
+  return connection_.request(
+      "scan", {{"format", "ply"}, {"density", "pixels"}, {"coordinate_frame", "rig"}, {"colour", colour_}});
 }
 
 Result<std::optional<std::string>> LiveClouds::receive() {

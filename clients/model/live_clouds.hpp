@@ -29,6 +29,8 @@ class LiveClouds {
 
   [[nodiscard]] const Calibration& calibration() const { return calibration_; }
 
+  /// Makes the next clouds coloured: the object must then stand still for two frames.
+  void want_colour() { colour_ = true; }
   /// Asks for a cloud. The service takes it while the caller works on the one before. @errors as Connection::request()
   [[nodiscard]] Result<> request();
   /// Waits for the cloud that was asked for.
@@ -51,6 +53,7 @@ class LiveClouds {
   Calibration calibration_;
   std::filesystem::path folder_;
   bool temporary_;
+  bool colour_ = false;
   std::ofstream lines_;
   std::size_t kept_ = 0;
   std::string problem_;

@@ -55,7 +55,7 @@ Result<std::vector<Placed>> place(std::span<const DensePoint> points, std::size_
 
 RangeImage crop(const std::vector<Placed>& placed, std::size_t number, const CalibratedCamera& camera) {
   RangeImage image{
-      number, camera.lens, camera.rig_from_camera.inverse(), camera.lens.width_px, camera.lens.height_px, 0, 0, {},
+      number, camera.lens, camera.rig_from_camera.inverse(), camera.lens.width_px, camera.lens.height_px, 0, 0, {}, {},
       {},     {}};
   int right = 0, bottom = 0;
   for (const Placed& each : placed) {
@@ -67,11 +67,13 @@ RangeImage crop(const std::vector<Placed>& placed, std::size_t number, const Cal
   image.depth_mm.assign(pixels, std::numeric_limits<float>::quiet_NaN());
   image.sigma_mm.assign(pixels, std::numeric_limits<float>::quiet_NaN());
   image.intensity.assign(pixels, 0);
+  if (placed.front().point->coloured) image.colours.assign(pixels, Rgb{});
   for (const Placed& each : placed) {
     const std::size_t pixel = image.index(each.u - image.left, each.v - image.top);
     image.depth_mm[pixel] = each.depth_mm;
     image.sigma_mm[pixel] = each.point->sigma_mm;
     image.intensity[pixel] = each.point->intensity;
+    if (!image.colours.empty()) image.colours[pixel] = each.point->colour;
   }
   return image;
 }
@@ -99,6 +101,7 @@ void RangeImage::trim() {
     values = std::move(kept);
   };
   keep(depth_mm), keep(sigma_mm), keep(intensity);
+  if (!colours.empty()) keep(colours);
   left += first_x, top += first_y, width = kept_width, height = kept_height;
 }
 

@@ -26,6 +26,7 @@ struct RangeImage {
   std::vector<float> depth_mm;                   ///< along the camera's z axis, row by row; NaN where not measured
   std::vector<float> sigma_mm;                   ///< along the ray
   std::vector<std::uint8_t> intensity;
+  std::vector<Rgb> colours;  ///< empty: the cloud has none
 
   [[nodiscard]] std::size_t index(int x, int y) const {
     return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
@@ -33,7 +34,7 @@ struct RangeImage {
   /// Crops to the pixels that are measured; to none if there is none.
   void trim();
   /// Keeps only what the camera is.
-  void drop_pixels() { depth_mm = {}, sigma_mm = {}, intensity = {}; }
+  void drop_pixels() { depth_mm = {}, sigma_mm = {}, intensity = {}, colours = {}; }
   /// Pixel of the crop, unrounded, that sees a point of the camera's frame with z > 0.
   [[nodiscard]] Eigen::Vector2f pixel_of(const Eigen::Vector3f& in_camera) const {
     const double depth = in_camera.z();

@@ -82,7 +82,7 @@ struct Options {
   std::filesystem::path recording, keep, background, preview;
   std::vector<std::filesystem::path> outputs;
   std::vector<float> box_mm;  ///< least x, y, z, then greatest
-  bool turntable = false;
+  bool turntable = false, colour = false;
   model::LiveOptions live;
   model::ModelOptions model;
   bool json = false, progress = false;
@@ -155,6 +155,7 @@ int run_live(const Options& options, model::Progress& progress) {
   auto clouds = model::LiveClouds::open(
       options.socket, options.keep.empty() ? std::nullopt : std::optional<std::filesystem::path>(options.keep));
   if (!clouds) return progress.fail(clouds.error());
+  if (options.colour) clouds->want_colour();
   const auto tell = [&progress](const std::string& sentence) { progress.say(sentence); };
   const auto on_cloud = [&progress](const model::ModelBuilder& builder, const model::SeenSides& sides,
                                     const std::string& left_out) { progress.add_cloud(builder, sides, left_out); };
@@ -218,6 +219,8 @@ int main(int argc, char** argv) {
       live(app.add_flag("--turntable", options.turntable, "scan a view at each line of the standard input, as Enter"));
   live(app.add_option("--views", options.live.views, "with --turntable: views of a full turn"))
       ->check(between(8, 360))
+      ->needs(turntable);
+  live(app.add_flag("--colour", options.colour, "with --turntable: the mesh shows the colour of the surface"))
       ->needs(turntable);
   live(app.add_flag("--until-closed", options.live.until_closed, "end when the object was seen from all sides"))
       ->excludes(turntable);

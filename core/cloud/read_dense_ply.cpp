@@ -17,11 +17,18 @@ namespace {
 
 /// Offsets of a record's fields.
 struct CloudLayout {
-  static constexpr std::array<std::string_view, 6> kNames{"x", "y", "z", "sigma_mm", "intensity", "camera"};
+  static constexpr std::array<std::string_view, 9> kNames{"x",      "y",   "z",     "sigma_mm", "intensity",
+                                                          "camera", "red", "green", "blue"};
+  static constexpr std::size_t kNeeded = 6, kRed = 6;
   std::array<std::optional<std::size_t>, kNames.size()> offsets;
   std::size_t record_bytes = 0, points = 0;
   bool symbols = false;
   bool rig = true;  ///< its points are in the rig's frame
+
+  [[nodiscard]] bool has(std::size_t from, std::size_t to) const {
+    return std::all_of(offsets.begin() + from, offsets.begin() + to,
+                       [](const auto& offset) { return offset.has_value(); });
+  }
 };
 
 /// The text before a mark, which both leave `text`; nothing if there is no mark.
@@ -92,11 +99,12 @@ Result<std::vector<DensePoint>> read_dense_ply(std::string_view bytes) {
     return fail(ErrorCode::kUnsupported,
                 "has its points in the robot's base; they are needed in the scanner's frame: scan with "
                 "--coordinate-frame rig");
-  const bool complete = std::ranges::all_of(layout->offsets, [](const auto& offset) { return offset.has_value(); });
-  if (!complete) return fail(ErrorCode::kMalformed, "is not a dense cloud: it lacks sigma_mm, intensity or camera");
+  if (!layout->has(0, CloudLayout::kNeeded))
+    return fail(ErrorCode::kMalformed, "is not a dense cloud: it lacks sigma_mm, intensity or camera");
   if (bytes.size() / layout->record_bytes < layout->points)
     return fail(ErrorCode::kMalformed,
                 fmt::format("is cut: it has {} of {} points", bytes.size() / layout->record_bytes, layout->points));
+  const bool coloured = layout->has(CloudLayout::kRed, CloudLayout::kNames.size());
   std::vector<DensePoint> points;
   points.reserve(layout->points);
   for (std::size_t i = 0; i < layout->points; ++i) {
@@ -106,6 +114,9 @@ Result<std::vector<DensePoint>> read_dense_ply(std::string_view bytes) {
     point.sigma_mm = number_at<float>(record, *layout->offsets[3]);
     point.intensity = number_at<std::uint8_t>(record, *layout->offsets[4]);
     point.camera = number_at<std::uint8_t>(record, *layout->offsets[5]);
+    point.coloured = coloured;
+    for (std::size_t i = 0; coloured && i < point.colour.size(); ++i)
+      point.colour[i] = number_at<std::uint8_t>(record, *layout->offsets[CloudLayout::kRed + i]);
     if (!point.place_mm.allFinite() || !(point.sigma_mm > 0) || !std::isfinite(point.sigma_mm))
       return fail(ErrorCode::kMalformed, fmt::format("point {} has no place or no sigma", i));
     points.push_back(point);

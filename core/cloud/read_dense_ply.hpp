@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 
+#include "core/image.hpp"
 #include "core/result.hpp"
 
 namespace slsd {
@@ -18,6 +19,8 @@ struct DensePoint {
   float sigma_mm = 0;  ///< one standard deviation along the camera's ray
   std::uint8_t intensity = 0;
   std::uint8_t camera = 0;  ///< index in the calibration
+  bool coloured = false;    ///< the cloud has colours
+  Rgb colour{};
 };
 
 /// Reads a dense cloud as slsd writes it: docs/formats.md, PLY.

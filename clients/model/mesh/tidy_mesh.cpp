@@ -86,6 +86,7 @@ Mesh tidy(const Mesh& mesh, double smallest_share) {
       copy(mesh.vertices_mm, tidied.vertices_mm, vertex);
       copy(mesh.sigma_mm, tidied.sigma_mm, vertex);
       copy(mesh.intensity, tidied.intensity, vertex);
+      copy(mesh.colours, tidied.colours, vertex);
       copy(mesh.frames, tidied.frames, vertex);
     }
   }

@@ -46,6 +46,20 @@ struct VoxelFacts {
   [[nodiscard]] bool empty() const { return passed > kSeenThrough * measured; }
 };
 
+/// Mean colour of a voxel, packed as a PCD packs it.
+struct VoxelColour {
+  static std::int32_t packed(const Rgb& colour) { return colour[0] << 16 | colour[1] << 8 | colour[2]; }
+  static Rgb of(std::int32_t packed) {
+    return {static_cast<std::uint8_t>(packed >> 16), static_cast<std::uint8_t>(packed >> 8),
+            static_cast<std::uint8_t>(packed)};
+  }
+};
+
+Rgb grey_of(unsigned intensity) {
+  const auto level = static_cast<std::uint8_t>(intensity);
+  return {level, level, level};
+}
+
 /// A voxel's place on a surface: the plane of the pixel that sees it.
 struct PixelPlane {
   Eigen::Vector3f place, normal;  // camera's frame
@@ -100,6 +114,11 @@ class SurfaceLookup {
   }
   [[nodiscard]] std::uint8_t intensity_of(const PixelPlane& plane) const {
     return image_.intensity[static_cast<std::size_t>(&plane - planes_.data())];
+  }
+  /// The colour; of a cloud without colours, the intensity.
+  [[nodiscard]] Rgb colour_of(const PixelPlane& plane) const {
+    return image_.colours.empty() ? grey_of(intensity_of(plane))
+                                  : image_.colours[static_cast<std::size_t>(&plane - planes_.data())];
   }
   /// Greatest depth of the surface in a square of pixels, mm; 0 if nothing is measured there. It may reach over the
   /// square by a tile.
@@ -165,7 +184,18 @@ struct Leaves {
   FloatLeaf* distance;
   FloatLeaf* weight;
   FactsLeaf* facts;
+  FactsLeaf* colour;  ///< null: no shot had colours
 };
+
+/// Moves the mean colour of a voxel towards another by its share. A voxel without one begins with its intensity.
+void blend_colour(FactsLeaf& leaf, openvdb::Index at, unsigned intensity, const Rgb& seen, float share) {
+  Rgb mean = leaf.isValueOn(at) ? VoxelColour::of(leaf.getValue(at)) : grey_of(intensity);
+  for (std::size_t i = 0; i < mean.size(); ++i) {
+    const float level = mean[i];
+    mean[i] = static_cast<std::uint8_t>(std::lround(level + share * (static_cast<float>(seen[i]) - level)));
+  }
+  leaf.setValueOn(at, VoxelColour::packed(mean));
+}
 
 /// Adds what a surface says of one voxel.
 void add_to_voxel(const Leaves& leaves, openvdb::Index at, const SurfaceLookup& surface, const Eigen::Vector3f& place,
@@ -188,6 +218,7 @@ void add_to_voxel(const Leaves& leaves, openvdb::Index at, const SurfaceLookup& 
     const float mean = before > 0 ? leaves.distance->getValue(at) : 0;
     leaves.distance->setValueOn(at, mean + share * (off_mm - mean));
     leaves.weight->setValueOn(at, sum);
+    if (leaves.colour) blend_colour(*leaves.colour, at, facts.intensity, surface.colour_of(*plane), share);
     const float level = static_cast<float>(facts.intensity);
     facts.intensity =
         static_cast<unsigned>(std::lround(level + share * (static_cast<float>(surface.intensity_of(*plane)) - level)));
@@ -226,10 +257,13 @@ void add_to_leaf(const Leaves& leaves, const SurfaceLookup& surface, const Volum
 
 struct Volume::Grids {
   openvdb::FloatGrid distance, weight;
-  openvdb::Int32Grid facts;
+  openvdb::Int32Grid facts, colour;
+  bool coloured = false;
 
+  [[nodiscard]] const openvdb::Int32Grid* colours() const { return coloured ? &colour : nullptr; }
   [[nodiscard]] Leaves touch(const Coord& at) {
-    return {distance.tree().touchLeaf(at), weight.tree().touchLeaf(at), facts.tree().touchLeaf(at)};
+    return {distance.tree().touchLeaf(at), weight.tree().touchLeaf(at), facts.tree().touchLeaf(at),
+            coloured ? colour.tree().touchLeaf(at) : nullptr};
   }
   /// Calls visit(leaf of the field, offset, distance, facts) for each voxel that light met or passed.
   template <class Visit>
@@ -260,12 +294,14 @@ std::size_t Volume::voxels() const {
   return grids_->weight.activeVoxelCount();
 }
 std::size_t Volume::bytes() const {
-  return grids_->distance.memUsage() + grids_->weight.memUsage() + grids_->facts.memUsage();
+  return grids_->distance.memUsage() + grids_->weight.memUsage() + grids_->facts.memUsage() +
+         (grids_->coloured ? grids_->colour.memUsage() : 0);
 }
 
 void Volume::add(const Shot& shot, const RigidTransform& object_from_rig) {
   for (const SurfaceView& view : shot.views) {
     const SurfaceLookup surface(view, object_from_rig);
+    grids_->coloured = grids_->coloured || !view.image.colours.empty();
     Coord last(std::numeric_limits<int>::max());
     surface.visit_band(options_.band_mm, kLeafSide * options_.voxel_mm / 2, [&](const Eigen::Vector3f& place) {
       const Eigen::Vector3f voxel = place / options_.voxel_mm;
@@ -305,28 +341,40 @@ std::array<Corner, 8> corners_of(const Eigen::Vector3f& voxel) {
 /// Reads what was measured around vertices.
 class VertexReader {
  public:
-  VertexReader(const openvdb::FloatGrid& weight, const openvdb::Int32Grid& facts, unsigned fewest_frames)
-      : weight_(weight.getConstAccessor()), facts_(facts.getConstAccessor()), fewest_frames_(fewest_frames) {}
+  /// @param colour  null: no shot had colours
+  VertexReader(const openvdb::FloatGrid& weight, const openvdb::Int32Grid& facts, const openvdb::Int32Grid* colour,
+               unsigned fewest_frames)
+      : weight_(weight.getConstAccessor()), facts_(facts.getConstAccessor()), fewest_frames_(fewest_frames) {
+    if (colour) colour_.emplace(colour->getConstAccessor());
+  }
 
   struct Vertex {
     float sigma_mm, frames, intensity;
+    Eigen::Vector3f colour;
   };
+  [[nodiscard]] bool coloured() const { return colour_.has_value(); }
   /// Nothing if the voxels around it were not all measured.
   [[nodiscard]] std::optional<Vertex> read(const Eigen::Vector3f& voxel) {
     float weights = 0, frames = 0, intensity = 0;
+    Eigen::Vector3f colour = Eigen::Vector3f::Zero();
     for (const Corner& corner : corners_of(voxel)) {
       const VoxelFacts facts = VoxelFacts::of(facts_.getValue(corner.at));
       if (facts.measured < fewest_frames_ || facts.empty()) return std::nullopt;
       weights += corner.share * weight_.getValue(corner.at);
       frames += corner.share * static_cast<float>(facts.measured);
       intensity += corner.share * static_cast<float>(facts.intensity);
+      if (!colour_) continue;
+      std::int32_t packed = 0;
+      const Rgb seen = colour_->probeValue(corner.at, packed) ? VoxelColour::of(packed) : grey_of(facts.intensity);
+      colour += corner.share * Eigen::Vector3f(seen[0], seen[1], seen[2]);
     }
-    return Vertex{1 / std::sqrt(weights), frames, intensity};
+    return Vertex{1 / std::sqrt(weights), frames, intensity, colour};
   }
 
  private:
   openvdb::FloatGrid::ConstAccessor weight_;
   openvdb::Int32Grid::ConstAccessor facts_;
+  std::optional<openvdb::Int32Grid::ConstAccessor> colour_;
   unsigned fewest_frames_;
 };
 
@@ -361,12 +409,17 @@ Mesh extract(const openvdb::FloatGrid& field, VertexReader reader, float voxel_m
     const Eigen::Vector3f voxel(points[i].x(), points[i].y(), points[i].z());
     auto vertex = reader.read(voxel);
     if (!vertex && !invent) continue;
-    if (!vertex) vertex = {std::numeric_limits<float>::quiet_NaN(), 0, kInventedIntensity};
+    if (!vertex)
+      vertex = {std::numeric_limits<float>::quiet_NaN(), 0, kInventedIntensity,
+                Eigen::Vector3f::Constant(kInventedIntensity)};
     kept[i] = static_cast<std::uint32_t>(mesh.vertices_mm.size());
     mesh.vertices_mm.push_back(voxel * voxel_mm);
     mesh.sigma_mm.push_back(vertex->sigma_mm);
     mesh.frames.push_back(static_cast<std::uint16_t>(std::lround(vertex->frames)));
-    mesh.intensity.push_back(static_cast<std::uint8_t>(std::lround(vertex->intensity)));
+    const auto level = [](float value) { return static_cast<std::uint8_t>(std::lround(value)); };
+    mesh.intensity.push_back(level(vertex->intensity));
+    const Eigen::Vector3f& colour = vertex->colour;
+    if (reader.coloured()) mesh.colours.push_back({level(colour.x()), level(colour.y()), level(colour.z())});
   }
   add_quads(quads, kept, mesh);
   return mesh;
@@ -382,7 +435,8 @@ Mesh Volume::mesh() const {
         if (!facts.empty()) to.setValueOn(at, distance_mm);
       },
       field);
-  return extract(field, {grids_->weight, grids_->facts, options_.fewest_frames}, options_.voxel_mm, false);
+  return extract(field, {grids_->weight, grids_->facts, grids_->colours(), options_.fewest_frames}, options_.voxel_mm,
+                 false);
 }
 
 Mesh Volume::closed_mesh() const {
@@ -396,7 +450,8 @@ Mesh Volume::closed_mesh() const {
         }
       },
       known);
-  return extract(*close_field(known), {grids_->weight, grids_->facts, options_.fewest_frames}, options_.voxel_mm, true);
+  return extract(*close_field(known), {grids_->weight, grids_->facts, grids_->colours(), options_.fewest_frames},
+                 options_.voxel_mm, true);
 }
 
 }  // namespace slsd::model

@@ -35,7 +35,8 @@ class Volume {
   /// @param shot  with its pixels
   void add(const Shot& shot, const RigidTransform& object_from_rig);
 
-  /// The surface in the object's frame, with sigma, number of frames and intensity for each vertex.
+  /// The surface in the object's frame, with sigma, number of frames and intensity for each vertex; with its
+  /// colour, too, if a shot had colours.
   [[nodiscard]] Mesh mesh() const;
   /// The same without holes: a surface is invented where none was measured. There `frames` is 0 and `sigma_mm` NaN.
   [[nodiscard]] Mesh closed_mesh() const;

@@ -42,6 +42,46 @@ TEST(Volume, MeansFramesByTheirSigmas) {
   for (const std::uint8_t intensity : mesh.intensity) EXPECT_EQ(intensity, 100);
 }
 
+/// A shot whose colours tell the place on the object: red to the right, blue below.
+Shot coloured_shot(unsigned seed, bool coloured) {
+  auto points = measure(bumpy_ball, rig_from_object(0), 0.02F, seed);
+  for (DensePoint& point : points) {
+    const auto level = [](float along_mm) { return static_cast<std::uint8_t>(std::lround(128 + 2 * along_mm)); };
+    point.coloured = coloured;
+    point.colour = {level(point.place_mm.x()), 90, level(point.place_mm.y())};
+  }
+  return make_shot(*range_images(points, test_calibration(), std::nullopt));
+}
+
+TEST(Volume, KeepsTheColourOfThePlace) {
+  Volume volume(kOptions);
+  for (unsigned seed : {1U, 2U, 3U}) volume.add(coloured_shot(seed, true), {});
+  const Mesh mesh = tidy(volume.mesh(), 0.01);
+  ASSERT_GT(mesh.vertices_mm.size(), 2000);
+  ASSERT_EQ(mesh.colours.size(), mesh.vertices_mm.size());
+  std::size_t far = 0;
+  for (std::size_t i = 0; i < mesh.colours.size(); ++i) {
+    const Eigen::Vector3f& vertex = mesh.vertices_mm[i];
+    const auto off = [](std::uint8_t level, float along_mm) { return std::abs(level - 128 - 2 * along_mm); };
+    far += off(mesh.colours[i][0], vertex.x()) > 4 || off(mesh.colours[i][2], vertex.y()) > 4;
+    EXPECT_NEAR(mesh.colours[i][1], 90, 1);
+  }
+  EXPECT_LT(static_cast<double>(far), 0.02 * static_cast<double>(mesh.colours.size()));
+}
+
+TEST(Volume, TakesTheIntensityOfCloudsWithoutColour) {
+  Volume plain(kOptions), mixed(kOptions);
+  for (unsigned seed : {1U, 2U}) plain.add(coloured_shot(seed, false), {});
+  EXPECT_TRUE(plain.mesh().colours.empty());
+  for (unsigned seed : {1U, 2U}) mixed.add(coloured_shot(seed, false), {});
+  mixed.add(coloured_shot(3, true), {});
+  const Mesh mesh = mixed.mesh();
+  ASSERT_EQ(mesh.colours.size(), mesh.vertices_mm.size());
+  double green = 0;
+  for (const Rgb& colour : mesh.colours) green += colour[1];
+  EXPECT_NEAR(green / static_cast<double>(mesh.colours.size()), (100 + 100 + 90) / 3.0, 2);  // the intensity is 100
+}
+
 TEST(Volume, FacesTheCamera) {
   Volume volume(kOptions);
   for (unsigned seed : {1U, 2U}) volume.add(shot_of(bumpy_ball, rig_from_object(0), 0.02F, seed), {});
