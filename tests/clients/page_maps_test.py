@@ -5,14 +5,15 @@
 import os
 import pathlib
 import re
+import shutil
 import tempfile
 import unittest
 
 import numpy as np
 
 from browser import Browser, is_there
-from page_service import Web
-from service import Service
+from page_service import Web, downloaded
+from service import SCENE, Service
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 CAN_SCAN = "!document.getElementById('scan').disabled"
@@ -69,6 +70,37 @@ class Maps(unittest.TestCase):
 
     def numbers(self, text):
         return [float(number) for number in re.findall(r"-?\d+\.\d+", text)]
+
+    def test_a_cloud_shows_the_colour_of_the_surface(self):
+        frames, downloads = (pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-", dir=self.folder)) for _ in range(2))
+        shutil.copy(SCENE / "frame.png", frames)
+        (frames / "white").mkdir()
+        x, y = np.meshgrid(np.arange(1600), np.arange(1200))
+        picture = np.stack([40 + x // 10, np.full_like(x, 120), 200 - y // 10], axis=2).astype(np.uint8)
+        (frames / "white/0.ppm").write_bytes(b"P6 1600 1200 255\n" + picture.tobytes())
+        with Service(camera_path=frames) as service, Web(service) as web, Browser(downloads) as browser, service.client() as client:
+            service.wait_ready()
+            self.open(browser, web)
+            self.scan(browser, "symbols")
+            self.choose(browser, "colour", "own")
+            self.assertIn("press Scan", browser.run("return document.getElementById('scale').textContent;"))
+            for density in ("symbols", "pixels"):
+                self.scan(browser, density)
+                self.assertIn("colour of the surface", browser.run("return document.getElementById('scale').textContent;"))
+                drawn, has = browser.run("""
+                    const drawn = view.points.geometry.getAttribute("colour").array, all = [[], []];
+                    ["red", "green", "blue"].forEach((name, c) => column(view.ply, name).forEach((level, i) => {
+                      if (i % 97 === 0) all[0].push(drawn[4 * i + c]), all[1].push(level); }));
+                    return all;""")
+                self.assertEqual(drawn, has)
+                browser.picture(self.folder / f"own-colour-{density}.png")
+                browser.click("#save-pcd")
+                file = downloaded(downloads, "*.pcd", 1 if density == "symbols" else 2)[-1].read_bytes()
+                expected = client.call("scan", colour=True, density=density, format="pcd")[1]
+                self.assertIn(b" rgb\n", file.split(b"DATA")[0])
+                shown, own = pixels_of(file), pixels_of(expected)
+                np.testing.assert_array_equal(shown["x"], own["x"])
+                np.testing.assert_array_equal(*(np.ascontiguousarray(each["rgb"]).view("<u4") for each in (shown, own)))
 
     def test_a_dense_map_says_what_the_file_has_at_each_pixel(self):
         with Service() as service, Web(service) as web, Browser() as browser, service.client() as client:

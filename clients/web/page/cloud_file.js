@@ -44,17 +44,22 @@ const kNameInPly = Object.fromEntries(Object.entries(kNameInPcd).map(([ply, pcd]
 const kTypeInPcd = {float: "F", uchar: "U", int: "I"};
 const kFirstLine = "# .PCD v0.7 - Point Cloud Data file format";
 
+// A PCD has a colour as one number, 0 red green blue from its highest byte: the PLY's bytes backwards.
+const kColours = ["red", "green", "blue"];
+
 // Organised: the lattices of the cameras one below the other, NaN where there is no point. Readers of PCD expect the
 // intensity as a float.
 function pcdOfSymbols(ply) {
   const columns = Number(ply.comments.lattice_columns), rows = Number(ply.comments.lattice_rows);
   const from = new DataView(ply.buffer, ply.begin);
   let cameras = Number(ply.comments.cameras || 1), record = 0;
-  const fields = Object.entries(ply.fields).map(([name, {type, offset}]) => {
+  const fields = Object.entries(ply.fields).filter(([name]) => !kColours.includes(name)).map(([name, {type, offset}]) => {
     const field = {name, type, offset, typeInPcd: name === "intensity" ? "float" : type, offsetInPcd: record};
     record += kSizes[field.typeInPcd];
     return field;
   });
+  const colour = kColours.map((name) => ply.fields[name]), offsetOfColour = record;
+  if (colour[0]) record += 4;
   const {camera, column, row} = ply.fields;
   for (let i = 0; i < ply.count; ++i) cameras = Math.max(cameras, 1 + from.getUint8(i * ply.record + camera.offset));
   const cells = new Uint8Array(cameras * rows * columns * record), to = new DataView(cells.buffer);
@@ -70,12 +75,14 @@ function pcdOfSymbols(ply) {
     const cell = (from.getUint8(at + camera.offset) * rows + place[1]) * columns + place[0];
     for (const {type, offset, typeInPcd, offsetInPcd} of fields)
       put(to, cell * record + offsetInPcd, typeInPcd, get(from, at + offset, type));
+    if (colour[0]) colour.forEach(({offset}, i) => to.setUint8(cell * record + offsetOfColour + 2 - i, from.getUint8(at + offset)));
   }
+  const all = colour[0] ? [...fields, {name: "rgb", typeInPcd: "float"}] : fields;
   const told = ["scan_id", "time", "frame", "sigma_calibration_mm", "units", "coordinate_frame"];
   const header = [kFirstLine, ...told.filter((name) => name in ply.comments).map((name) => `# ${name} ${ply.comments[name]}`),
-    "VERSION 0.7", "FIELDS " + fields.map(({name}) => kNameInPcd[name] || name).join(" "),
-    "SIZE " + fields.map(({typeInPcd}) => kSizes[typeInPcd]).join(" "),
-    "TYPE " + fields.map(({typeInPcd}) => kTypeInPcd[typeInPcd]).join(" "), "COUNT " + fields.map(() => 1).join(" "),
+    "VERSION 0.7", "FIELDS " + all.map(({name}) => kNameInPcd[name] || name).join(" "),
+    "SIZE " + all.map(({typeInPcd}) => kSizes[typeInPcd]).join(" "),
+    "TYPE " + all.map(({typeInPcd}) => kTypeInPcd[typeInPcd]).join(" "), "COUNT " + all.map(() => 1).join(" "),
     "WIDTH " + columns, "HEIGHT " + cameras * rows, "VIEWPOINT 0 0 0 1 0 0 0", "POINTS " + cameras * columns * rows,
     "DATA binary", ""].join("\n");
   return [header, cells];
@@ -115,12 +122,18 @@ function plyOfPixels(buffer) {
   const count = Number(words("POINTS")[0]), begin = end + "\nDATA binary\n".length;
   const sizes = words("SIZE").map(Number), types = words("TYPE");
   let record = 0, recordInPly = 0;
-  const fields = words("FIELDS").map((nameInPcd, i) => {
+  const fields = words("FIELDS").flatMap((nameInPcd, i) => {
+    if (nameInPcd === "rgb") {
+      const bytes = kColours.map((name, c) =>
+        ({name, type: "uchar", offset: record + 2 - c, typeInPly: "uchar", offsetInPly: recordInPly + c}));
+      [record, recordInPly] = [record + 4, recordInPly + 3];
+      return bytes;
+    }
     const name = kNameInPly[nameInPcd] || nameInPcd, type = types[i] === "F" ? "float" : types[i] === "I" ? "int" : "uchar";
     const typeInPly = name === "intensity" ? "uchar" : type;
     const field = {name, type, offset: record, typeInPly, offsetInPly: recordInPly};
     [record, recordInPly] = [record + sizes[i], recordInPly + kSizes[typeInPly]];
-    return field;
+    return [field];
   });
   if (buffer.byteLength < begin + count * record) throw new Error("the cloud is cut off");
   const from = new DataView(buffer, begin), records = new Uint8Array(count * recordInPly), to = new DataView(records.buffer);

@@ -42,7 +42,8 @@ function offerColours() {
   view.paint();
 }
 
-const kUnits = {z: "mm of depth", intensity: "intensity, of 255", sigma_mm: "mm of sigma", symbol: "number of the symbol"};
+const kUnits = {z: "mm of depth", intensity: "intensity, of 255", sigma_mm: "mm of sigma", symbol: "number of the symbol",
+                own: "mm of depth: press Scan for the colour, which takes one more frame"};
 
 // ---- in space or as a map ----
 
@@ -55,7 +56,8 @@ function drawShown() {
   if (!view || !view.ply) return;
   if (!isMap()) {
     view.drawDistances(measurements);
-    showColourBar($("scale"), view.range, view.colour === "intensity", kUnits[view.colour]);
+    if (view.showsOwn()) $("scale").replaceChildren(element("span", "colour of the surface in white light", "unit"));
+    else showColourBar($("scale"), view.range, view.colour === "intensity", kUnits[view.colour] || kUnits.own);
     return;
   }
   drawMap().then(() => say("map", null), (error) => say("map", error));
@@ -119,8 +121,8 @@ function followCursor(event) {
 
 async function scan() {
   const preset = presetOfScan();
-  const density = $("density").value;
-  const {buffer, about} = await askWithProgress("api/scan", {density, ...preset, ...partOfScan()}, density);
+  const density = $("density").value, colour = $("colour").value === "own" ? {colour: true} : {};
+  const {buffer, about} = await askWithProgress("api/scan", {density, ...preset, ...partOfScan(), ...colour}, density);
   boxWasScanned();
   showCloud(buffer, about);
   if (preset.preset) await presetWasScanned();

@@ -55,9 +55,8 @@ function positions(ply) {
 }
 
 // Colours are worked out once a cloud, not once a frame: without a graphics card each frame would pay for them.
-// @param shade   of shadeOf(), or null
-// @param hidden  whether a value of `depths` is left out: no colour
-function coloursOf(values, [low, high], grey, shade, depths, hidden) {
+// @param shade  of shadeOf(), or null
+function coloursOf(values, [low, high], grey, shade) {
   const table = colourTable(grey);
   const colours = new Uint32Array(values.length), scale = 255 / (high - low);
   for (let i = 0; i < values.length; ++i)
@@ -72,8 +71,14 @@ function coloursOf(values, [low, high], grey, shade, depths, hidden) {
       }
     }
   }
-  if (hidden) for (let i = 0; i < values.length; ++i) if (hidden(depths[i])) colours[i] = 0;
   return new Uint8Array(colours.buffer);
+}
+
+// The colours that the cloud itself has.
+function ownColours(ply) {
+  const bytes = new Uint8Array(4 * ply.count).fill(255);
+  ["red", "green", "blue"].forEach((name, c) => column(ply, name).forEach((level, i) => bytes[4 * i + c] = level));
+  return bytes;
 }
 
 const kVertexShader = `
@@ -196,15 +201,21 @@ class CloudView {
     this.draw();
   }
 
-  // By a column of the cloud; by depth where it has no such column.
+  // Whether the points are drawn in the colours of the cloud itself.
+  showsOwn() {
+    return this.colour === "own" && Boolean(this.ply && this.ply.fields.red);
+  }
+
+  // By a column of the cloud; by depth if it has no such column.
   paint() {
     if (!this.ply) return null;
     const values = column(this.ply, this.colour) || column(this.ply, "z");
     const depths = this.limits && column(this.ply, "z");
     const grey = this.colour === "intensity", [near, far] = this.limits || [-Infinity, Infinity];
     this.range = grey ? [0, 255] : this.colour === "z" && this.limits ? this.limits : rangeOf(values);
-    const colours = coloursOf(values, this.range, grey, this.shaded && !grey ? this.shade() : null, depths,
-                              this.limits && ((z) => z < near || z > far));
+    const colours = this.showsOwn() ? ownColours(this.ply)
+      : coloursOf(values, this.range, grey, this.shaded && !grey ? this.shade() : null);
+    if (depths) depths.forEach((z, i) => { if (z < near || z > far) colours.fill(0, 4 * i, 4 * i + 4); });
     this.points.geometry.setAttribute("colour", new THREE.BufferAttribute(colours, 4, true));
     this.setSizes();
     this.draw();

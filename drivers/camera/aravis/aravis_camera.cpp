@@ -102,6 +102,10 @@ Result<Frame> AravisCamera::capture(MonotonicTime deadline) {
   return note(session_->capture(deadline));
 }
 
+void AravisCamera::expect(Picture light) {
+  if (session_) session_->expect(light);
+}
+
 Result<Frame> AravisCamera::capture_next(MonotonicTime deadline) {
   if (options_.trigger != AravisTrigger::kFreeRun || !last_start_) return capture(deadline);
   return note(session_->capture_since(*last_start_ + std::chrono::nanoseconds(1), deadline));

@@ -51,9 +51,7 @@ class AravisCamera final : public Camera {
   /// @errors kMismatch: the frame was exposed with other settings than configured, and is lost; as Camera::capture()
   [[nodiscard]] Result<Frame> capture(MonotonicTime deadline) override;
   [[nodiscard]] Result<Frame> capture_next(MonotonicTime deadline) override;
-  void expect(Picture light) override {
-    if (session_) session_->expect(light);
-  }
+  void expect(Picture light) override;
   /// Makes the next capture in free run pass over one frame more, because some cameras expose that one as before.
   [[nodiscard]] Result<> set_exposure(double exposure_us) override;
   /// Reports what the device's clock, read every second, or the heartbeat has detected.
