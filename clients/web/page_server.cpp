@@ -38,8 +38,8 @@ constexpr std::size_t kScriptBytesMax = 4 << 20;
 constexpr std::size_t kResultBytesMax = 1 << 20;
 
 // What a page may ask of a scan.
-constexpr std::array<std::string_view, 9> kScanKeys = {"density", "texture", "colour", "ambient", "normals",
-                                                       "preset",  "box",     "plane",   "box_frame"};
+constexpr std::array<std::string_view, 9> kScanKeys = {"density", "texture", "colour", "ambient",  "normals",
+                                                       "preset",  "box",     "plane",  "box_frame"};
 
 // No exceptions: no external or inline script, style or picture, and no frame around the page.
 constexpr const char* kPolicy =

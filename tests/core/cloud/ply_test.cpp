@@ -104,7 +104,7 @@ TEST(ReadPly, RefusesEveryTruncation) {
 }
 
 TEST(ReadPly, RefusesACellThatIsNone) {
-  std::string text = write_ply(any_cloud(3, 4, 4));
+  std::string text = write_ply(any_cloud(4, 4, 4));
   text.back() = '\x80';
   EXPECT_THAT(to_string(read_ply(text, "cloud.ply").error()), HasSubstr("cloud.ply: has no valid cell in point"));
 }

@@ -126,7 +126,7 @@ TEST(ReadColours, GivesThoseOfAJpeg) {
 
 TEST(ReadColours, GivesNoneOfAGreyImage) {
   const test::TemporaryFolder folder;
-  const Samples samples = samples_of(random_image<std::uint8_t>());
+  const Samples samples = samples_of(ramp8(12, 8, 10));
   EXPECT_TRUE(read_colours(folder.write("grey.png", test::png_bytes(samples)))->empty());
   EXPECT_FALSE(read_colours(folder.write("none.png", "")).has_value());
 }
