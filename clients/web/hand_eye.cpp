@@ -12,7 +12,6 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstdlib>
 #include <system_error>
 #include <utility>
 
@@ -180,17 +179,6 @@ json error_of(const json& told, const path& socket) {
 }
 
 }  // namespace
-
-path default_looks() {
-  const auto folder_in = [](const char* name) {
-    const char* const folder = std::getenv(name);
-    return folder != nullptr && *folder == '/' ? path(folder) : path();
-  };
-  if (const path state = folder_in("STATE_DIRECTORY"); !state.empty()) return state / "hand_eye";
-  if (const path state = folder_in("XDG_STATE_HOME"); !state.empty()) return state / "slsd-web/hand_eye";
-  if (const path home = folder_in("HOME"); !home.empty()) return home / ".local/state/slsd-web/hand_eye";
-  return std::filesystem::temp_directory_path() / "slsd-web-hand_eye";
-}
 
 HandEye::HandEye(path folder, path socket) : folder_(std::move(folder)), socket_(std::move(socket)) {
   choices_ = {{"mounted", kMountings.front()}, {"poses", pose_notation_names().front()}};

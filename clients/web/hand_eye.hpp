@@ -16,10 +16,6 @@
 
 namespace slsd::web {
 
-/// The folder of looks, unless the user names one: in $STATE_DIRECTORY, as systemd sets it, else in the user's own
-/// folder of states.
-[[nodiscard]] std::filesystem::path default_looks();
-
 /// A hand-eye calibration, which all browsers share: a folder of looks, and slsd-hand-eye, which takes looks with the
 /// service and calibrates.
 /// @thread thread-safe; an action while another one is under way is refused as busy

@@ -9,6 +9,7 @@
 #include <array>
 #include <charconv>
 #include <cstdint>
+#include <cstdlib>
 #include <utility>
 
 #include "clients/connection/connection.hpp"
@@ -113,6 +114,17 @@ bool is_loopback(const std::string& address) {
   return address.starts_with("127.") || address == "::1" || address == "localhost";
 }
 
+std::filesystem::path state_folder(const std::string& name) {
+  const auto folder_in = [](const char* variable) {
+    const char* const folder = std::getenv(variable);
+    return folder != nullptr && *folder == '/' ? std::filesystem::path(folder) : std::filesystem::path();
+  };
+  if (const auto state = folder_in("STATE_DIRECTORY"); !state.empty()) return state / name;
+  if (const auto state = folder_in("XDG_STATE_HOME"); !state.empty()) return state / "slsd-web" / name;
+  if (const auto home = folder_in("HOME"); !home.empty()) return home / ".local/state/slsd-web" / name;
+  return std::filesystem::temp_directory_path() / ("slsd-web-" + name);
+}
+
 Answer PageServer::refusal_of(const Failure& failure) const {
   const std::string &name = failure.error.name, &where = failure.error.where;
   if (is_away(name, where, options_.socket)) return answer_of(no_service(options_.socket));
@@ -129,9 +141,11 @@ PageServer::PageServer(PageOptions options, Token token)
       token_(std::move(token)),
       symbols_(options_.socket, "symbols", kSymbolsHz),
       pixels_(options_.socket, "pixels", kPixelsHz),
-      hand_eye_(options_.looks, options_.socket) {
+      hand_eye_(options_.looks, options_.socket),
+      model_(options_.model, options_.socket) {
   add_pages();
   add_requests();
+  add_model_requests();
 }
 
 Result<> PageServer::open() {
@@ -153,6 +167,13 @@ Result<> PageServer::open() {
   if (is_loopback(options_.listen)) names.emplace_back("localhost");
   gate_ = std::make_unique<Gate>(std::move(names), token_, "slsd_session_" + std::to_string(port()));
   return {};
+}
+
+void PageServer::run(const std::function<void()>& at_end) {
+  server_->run([&] {
+    at_end();
+    model_.end();
+  });
 }
 
 // Judges the head alone, so that no body without a secret is read.
@@ -283,6 +304,38 @@ void PageServer::add_requests() {
   pass_on("/api/preset", "preset");
   pass_on("/api/calibrate", "calibrate");
   post("/api/login", true, [this](const Request& request, const json& body) { return log_in(request, body); });
+}
+
+void PageServer::add_model_requests() {
+  get("/api/model", [this](const Request&) { return json_answer(model_.look()); });
+  get("/api/model/preview", [this](const Request&) {
+    const json about{{"number", model_.look()["previews"]}};  // before: the points are as new or newer
+    auto points = model_.preview();
+    return points ? cloud_answer(std::move(*points), about) : answer_of(points.error());
+  });
+  get("/api/model/file", [this](const Request& request) {
+    auto file = model_.file(parameter(request, "format"));
+    return file ? cloud_answer(std::move(*file), json::object()) : answer_of(file.error());
+  });
+  post("/api/model/act", false, [this](const Request&, const json& body) {
+    const auto done = model_.act(body);
+    return done ? json_answer(*done) : answer_of(done.error());
+  });
+  post("/api/model/background", false, [this](const Request&, const json&) { return take_background(); });
+}
+
+/// A cloud of the scene without the object.
+Answer PageServer::take_background() {
+  const auto answered = call("scan",
+                             {{"format", "ply"},
+                              {"density", "pixels"},
+                              {"coordinate_frame", "rig"},
+                              {"timeout_ms", 60'000},
+                              {"transport", "memfd"}},
+                             kTimeout);
+  if (!answered) return refusal_of(answered.error());
+  if (const auto refused = model_.keep_background(answered->reply.bytes)) return answer_of(*refused);
+  return json_answer(model_.look());
 }
 
 tl::expected<Answered, Failure> PageServer::call(const char* method, const json& params,

@@ -21,9 +21,14 @@
 #include "clients/web/gate.hpp"
 #include "clients/web/hand_eye.hpp"
 #include "clients/web/http_server.hpp"
+#include "clients/web/model/model_session.hpp"
 #include "clients/web/pages.hpp"
 
 namespace slsd::web {
+
+/// A folder for what outlives the page, unless the user names one: in $STATE_DIRECTORY, as systemd sets it, else in the
+/// user's own folder of states.
+[[nodiscard]] std::filesystem::path state_folder(const std::string& name);
 
 struct PageOptions {
   std::filesystem::path socket = client::default_socket();
@@ -33,7 +38,8 @@ struct PageOptions {
   std::filesystem::path token_file = {};                        ///< empty: a random token for this run
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
   std::filesystem::path boards = SLSD_BOARDS;                   ///< boards that are ready to print
-  std::filesystem::path looks = default_looks();                ///< of a hand-eye calibration
+  std::filesystem::path looks = state_folder("hand_eye");       ///< of a hand-eye calibration
+  std::filesystem::path model = state_folder("model");          ///< clouds and files of the latest model
 };
 
 /// Tells whether only this machine can reach the address.
@@ -55,7 +61,7 @@ class PageServer {
   [[nodiscard]] Result<> open();
   [[nodiscard]] int port() const { return server_->port(); }
   /// Serves until a signal ends the program. @param at_end  called before
-  void run(const std::function<void()>& at_end) { server_->run(at_end); }
+  void run(const std::function<void()>& at_end);
 
  private:
   /// One address: its method, its secret, its answer.
@@ -88,6 +94,8 @@ class PageServer {
   [[nodiscard]] Answer look(const Request& request) const;
   [[nodiscard]] Answer cloud(const Request& request);
   [[nodiscard]] Answer scan(const nlohmann::json& body);
+  void add_model_requests();
+  [[nodiscard]] Answer take_background();
   [[nodiscard]] Answer past(const Request& request);
   void keep(PastScan scan);
 
@@ -99,6 +107,7 @@ class PageServer {
   CloudFeed symbols_;
   CloudFeed pixels_;
   HandEye hand_eye_;
+  ModelSession model_;
   std::mutex mutex_;
   std::deque<PastScan> past_;  ///< newest first
 };

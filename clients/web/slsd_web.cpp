@@ -90,6 +90,7 @@ int main(int argc, char** argv) {
   app.add_option("--three", options.three, "the folder of three.js; default: that of Debian's libjs-three");
   app.add_option("--boards", options.boards, "the folder of boards to print (" + options.boards.string() + ")");
   app.add_option("--hand-eye", options.looks, "the folder of the looks of a hand-eye calibration");
+  app.add_option("--model", options.model, "the folder of a model's clouds and files");
   app.add_flag("--address", only_address, "print the address and token of the running page, and exit");
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   std::signal(SIGPIPE, SIG_IGN);

@@ -22,7 +22,7 @@ from service import Service, slsctl
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
 READY = "document.getElementById('state').textContent === 'Ready to scan.'"
 CAN_SCAN = "!document.getElementById('scan').disabled"
-VIEWS = ("devices", "camera", "cloud", "calibrate", "history")
+VIEWS = ("devices", "camera", "cloud", "model", "calibrate", "history")
 CONTROLS = {"button", "checkbox", "combobox", "slider", "spinbutton", "textbox"}
 BACKGROUND = [0x16, 0x18, 0x1c]
 

@@ -239,7 +239,7 @@ class Operator(unittest.TestCase):
             self.full_screen(browser, "f", "cloud", "#space")
             self.full_screen(browser, "g", "camera", "#picture")
             browser.resize(390, 844)
-            for key, view in (("1", "devices"), ("4", "calibrate"), ("3", "cloud")):
+            for key, view in (("1", "devices"), ("4", "model"), ("5", "calibrate"), ("3", "cloud")):
                 browser.key(key)
                 self.assertEqual(browser.run("return [...document.querySelectorAll('main section')]"
                                              ".filter((s) => s.offsetParent).map((s) => s.id);"), [view])

@@ -127,7 +127,7 @@ class Views(unittest.TestCase):
             browser.wait(f"shownScan.scan !== '{shown}'", "no live cloud")
             browser.click("#cloud-live")
             browser.resize(390, 844)
-            for view in ("devices", "camera", "cloud", "calibrate", "history"):
+            for view in ("devices", "camera", "cloud", "model", "calibrate", "history"):
                 browser.click(f"nav [data-view={view}]")
                 time.sleep(0.3)
                 self.assertEqual(browser.run("return [...document.querySelectorAll('main section')]"

@@ -38,14 +38,19 @@ function rangeOfField(ply, name) {
   return rangeOf(Float32Array.from({length: Math.ceil(ply.count / step)}, (_, i) => from.getFloat32(i * step * ply.record + offset, true)));
 }
 
+const positions = (ply) => vectors(ply, 0);
+
+// Of a cloud without cells, whose normals are in its file.
+const normalsOf = (ply) => ply.fields.nx ? vectors(ply, ply.fields.nx.offset) : null;
+
 // y and z are turned round, as the screen has y up and looks along -z.
-function positions(ply) {
+function vectors(ply, offset) {
   const view = new DataView(ply.buffer);
   const values = new Float32Array(3 * ply.count), step = kSpread.length * ply.record;
   const end = ply.begin + ply.count * ply.record;
   let i = 0;
   for (const first of kSpread) {
-    for (let at = ply.begin + first * ply.record; at < end; at += step) {
+    for (let at = ply.begin + first * ply.record + offset; at < end; at += step) {
       values[i++] = view.getFloat32(at, true);
       values[i++] = -view.getFloat32(at + 4, true);
       values[i++] = -view.getFloat32(at + 8, true);
@@ -83,10 +88,16 @@ function ownColours(ply) {
 
 const kVertexShader = `
 attribute vec4 colour;
-uniform float least, most, pitch;
+uniform float least, most, pitch, lit;
 varying vec4 tint;
 void main() {
   tint = colour;
+  if (lit > 0.5) {
+    // Light comes from the upper left, behind the viewer. What is seen from its inside is dark.
+    vec3 outward = normalize(normalMatrix * normal);
+    bool inside = dot(outward, (modelViewMatrix * vec4(position, 1.0)).xyz) > 0.0;
+    tint.rgb *= inside ? 0.3 : 0.35 + 0.65 * max(0.0, dot(outward, normalize(vec3(-0.3, 0.6, 0.75))));
+  }
   gl_Position = projectionMatrix * (modelViewMatrix * vec4(position, 1.0));
   gl_PointSize = clamp(pitch * -position.z / gl_Position.w, least, most);
 }`;
@@ -96,9 +107,10 @@ void main() {
   if (tint.a < 0.5) discard;
   gl_FragColor = vec4(tint.rgb, 1.0);
 }`;
-const kFill = {symbols: 0.8, pixels: 1.5};    // of the gap to the neighbours
-const kLargest = {symbols: 22, pixels: 16};  // px
+const kFill = {symbols: 0.8, pixels: 1.5, model: 1.7};    // of the gap to the neighbours
+const kLargest = {symbols: 22, pixels: 16, model: 40};  // px
 
+const kPlain = 0.85;  // grey of a surface that has the colour "plain"
 const kBackground = 0x16181c;
 const kTurn = 1500, kSlowest = 110, kAim = 80, kFastest = 50, kRest = 300, kPace = 500;  // ms between two frames
 const kFew = 50000;  // points that are always drawn
@@ -133,7 +145,7 @@ class CloudView {
   makeCanvas() {
     this.lost = false;
     this.material = new THREE.ShaderMaterial({
-      uniforms: {least: {value: 2}, most: {value: 2}, pitch: {value: 0}},
+      uniforms: {least: {value: 2}, most: {value: 2}, pitch: {value: 0}, lit: {value: 0}},
       vertexShader: kVertexShader, fragmentShader: kFragmentShader});
     this.renderer = new THREE.WebGLRenderer({antialias: false, preserveDrawingBuffer: false});
     const canvas = this.renderer.domElement;
@@ -187,6 +199,9 @@ class CloudView {
   show(ply) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(positions(ply), 3));
+    const normals = ply.cells ? null : normalsOf(ply);
+    if (normals) geometry.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
+    this.material.uniforms.lit.value = normals ? 1 : 0;
     if (this.points) {
       this.scene.remove(this.points);
       this.points.geometry.dispose();
@@ -209,10 +224,11 @@ class CloudView {
   // By a column of the cloud; by depth if it has no such column.
   paint() {
     if (!this.ply) return null;
-    const values = column(this.ply, this.colour) || column(this.ply, "z");
+    const plain = this.colour === "plain";
+    const values = plain ? new Float32Array(this.ply.count).fill(kPlain) : column(this.ply, this.colour) || column(this.ply, "z");
     const depths = this.limits && column(this.ply, "z");
-    const grey = this.colour === "intensity", [near, far] = this.limits || [-Infinity, Infinity];
-    this.range = grey ? [0, 255] : this.colour === "z" && this.limits ? this.limits : rangeOf(values);
+    const grey = plain || this.colour === "intensity", [near, far] = this.limits || [-Infinity, Infinity];
+    this.range = plain ? [0, 1] : grey ? [0, 255] : this.colour === "z" && this.limits ? this.limits : rangeOf(values);
     const colours = this.showsOwn() ? ownColours(this.ply)
       : coloursOf(values, this.range, grey, this.shaded && !grey ? this.shade() : null);
     if (depths) depths.forEach((z, i) => { if (z < near || z > far) colours.fill(0, 4 * i, 4 * i + 4); });
@@ -231,7 +247,7 @@ class CloudView {
   // A point is as large as the gap to its neighbours, whatever the zoom.
   setSizes() {
     if (this.ply.pitch === undefined) this.ply.pitch = pitchOf(this.ply);
-    const kind = this.ply.fields.symbol ? "symbols" : "pixels", {least, most, pitch} = this.material.uniforms;
+    const kind = this.ply.fields.symbol ? "symbols" : this.ply.comments.spacing_mm ? "model" : "pixels", {least, most, pitch} = this.material.uniforms;
     const pxPerShare = this.renderer.domElement.height / 2 / Math.tan(this.camera.fov / 2 * Math.PI / 180);
     least.value = this.ply.count > 50000 ? 2 : 4;
     most.value = Math.max(least.value, kLargest[kind]);

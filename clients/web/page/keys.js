@@ -3,7 +3,7 @@
 "use strict";
 
 // Keys, each for what a button does; and the view that takes the whole screen.
-const kViews = ["devices", "camera", "cloud", "calibrate", "history"];
+const kViews = ["devices", "camera", "cloud", "model", "calibrate", "history"];
 
 function press(id) {
   if (!$(id).disabled) $(id).click();

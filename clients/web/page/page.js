@@ -344,6 +344,7 @@ function begin() {
   beginBoards();
   beginHandEye();
   beginPresets();
+  beginModel();
   beginKeys();
   // What draws clouds is large, and would hold the picture up; a camera that is gone does not hold it up for long.
   Promise.race([pictured, pause(3000)]).then(prepareCloud);

@@ -53,9 +53,11 @@ function shadeOf(ply) {
   return {bright, gloss};
 }
 
+const mean = ([low, high]) => (low + high) / 2;
+
 // How far apart neighbours are, as a share of their depth: so large a point is drawn that no gaps are left. 0: unknown
 function pitchOf(ply) {
-  if (!ply.cells) return 0;
+  if (!ply.cells) return ply.comments.spacing_mm ? Number(ply.comments.spacing_mm) / mean(rangeOfField(ply, "z")) : 0;
   const {columns, at} = ply.cells, found = [];
   const [x, y, z] = ["x", "y", "z"].map((name) => column(ply, name, false));
   const step = Math.max(1, Math.floor(at.length / 20000));
