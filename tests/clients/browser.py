@@ -39,7 +39,8 @@ class Browser:
         while True:
             try:
                 made = self.ask("POST", "/session", {"capabilities": {"alwaysMatch": {
-                    "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"}}}})
+                    "goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL"},
+                    "timeouts": {"script": 1000 * TIMEOUT_S, "pageLoad": 1000 * TIMEOUT_S}}}})
                 break
             except (urllib.error.URLError, ConnectionError):
                 if time.monotonic() > end:
