@@ -89,10 +89,12 @@ Result<> add_colours(const FrameSet& set, const ScanSetup& setup, std::size_t ca
     auto converted = frames[camera].colours();
     if (!converted) return tl::unexpected(std::move(converted.error()));
     colours = std::move(*converted);
-    return {};
+    if (colours.empty() || size_of(frames[camera].image()) == std::pair(colours.width(), colours.height())) return {};
+    return fail(ErrorCode::kMismatch, "the colours of a frame have another size than the frame: scan again");
   };
   auto added = read(set.white, seen.white);
   if (added) added = read(set.dark, seen.dark);
+  if (!added && added.error().where.empty()) added.error().where = "camera " + setup.camera_names[camera];
   if (!added || seen.white.empty()) return added;
   seen.light.white_colours = &seen.white;
   if (!seen.dark.empty()) seen.light.dark_colours = &seen.dark;

@@ -57,5 +57,42 @@ TEST(Reconstruct, TakesTheRoomsLightFromIntensitiesAtEveryDepth) {
   }
 }
 
+Result<ScanResult> scan_colours(Result<ColourFrame> colours) {
+  const Pattern pattern = *make_pattern({});
+  const Grey8 seen = simulate(draw_pattern(pattern), paper_rig(), plane({0, 0, 2000}, {0, 0, 1}), {});
+  const Grey8 white(seen.width(), seen.height(), 100);
+  ScanSetup setup{pattern, draw_pattern(pattern), paper_rig(), {"camera"}, {}};
+  setup.colour_gains = {{1, 1, 2}};
+  setup.lanes.emplace_back().push_back(std::move(*Decoder::create(pattern, paper_rig(), 0, {})));
+  FrameSet set;
+  set.frames = frame_of(seen.view());
+  set.white.push_back(std::move(frame_of(white.view()).front()).with_colours([&] { return colours; }));
+  ScanRequest request;
+  request.texture = request.colour = true;
+  return reconstruct(set, setup, 0, request, "scan");
+}
+
+TEST(Reconstruct, GivesPointsTheColoursOfTheWhiteFrame) {
+  const auto result = scan_colours(ColourFrame(1600, 1200, {10, 20, 30}));
+  ASSERT_TRUE(result) << to_string(result.error());
+  EXPECT_TRUE(result->cloud.coloured);
+  ASSERT_GT(result->cloud.points.size(), 1000U);
+  for (const CloudPoint& point : result->cloud.points) ASSERT_EQ(point.colour, (Rgb{10, 20, 60}));
+  ASSERT_EQ(result->white_balance.size(), 1U);
+  EXPECT_EQ(result->white_balance.front().gains, (ColourGains{2, 1, 20.0 / 30}));
+}
+
+// A file may change between its frame and its colours.
+TEST(Reconstruct, RefusesColoursThatDoNotFitTheFrame) {
+  for (const auto& [colours, code] :
+       {std::pair<Result<ColourFrame>, ErrorCode>(ColourFrame(800, 1200), ErrorCode::kMismatch),
+        {fail(ErrorCode::kNotFound, "is gone"), ErrorCode::kNotFound},
+        {ColourFrame(), ErrorCode::kUnsupported}}) {
+    const auto result = scan_colours(colours);
+    ASSERT_FALSE(result);
+    EXPECT_EQ(result.error().code, code) << to_string(result.error());
+  }
+}
+
 }  // namespace
 }  // namespace slsd
