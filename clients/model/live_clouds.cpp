@@ -76,8 +76,9 @@ Result<LiveClouds> LiveClouds::open(const path& socket, const std::optional<path
 }
 
 Result<> LiveClouds::request() {
-  return connection_.request(
-      "scan", {{"format", "ply"}, {"density", "pixels"}, {"coordinate_frame", "rig"}, {"colour", colour_}});
+  json params{{"format", "ply"}, {"density", "pixels"}, {"coordinate_frame", "rig"}};
+  if (colour_) params["colour"] = true;
+  return connection_.request("scan", std::move(params));
 }
 
 Result<std::optional<std::string>> LiveClouds::receive() {

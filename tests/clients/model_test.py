@@ -95,6 +95,16 @@ def cloud(distance, degrees, seed, behind=nothing):
             .encode() + points.tobytes())
 
 
+def coloured(ply):
+    """The same cloud with red 200, green 100, blue 50."""
+    header, body = ply.split(b"end_header\n", 1)
+    plain = np.frombuffer(body, "V18")
+    points = np.zeros(len(plain), [("plain", "V18"), ("colour", "u1", 3)])
+    points["plain"], points["colour"] = plain, (200, 100, 50)
+    lines = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+    return header + lines.encode() + b"end_header\n" + points.tobytes()
+
+
 def matrix(name, rows):
     rows = np.asarray(rows, float)
     return (f"{name}: !!opencv-matrix\n   rows: {rows.shape[0]}\n   cols: {rows.shape[1]}\n   dt: d\n"
@@ -276,15 +286,15 @@ class Model(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("the recording was cut: its first 4 clouds are used", done.stderr)
 
-    def scanner(self, clouds, errors=(), also=()):
-        """A service whose scans give these clouds, the last one again and again. @param errors  by number of the scan  @param also  parameters that a request may have"""
+    def scanner(self, clouds, errors=(), also=(), **more):
+        """A service whose scans give these clouds, the last one again and again. @param errors  by number of the scan  @param also  parameters that a request may have @param more  what it must have"""
         asked = []
 
         def answer(request):
             if request["method"] == "settings":
                 return result(request, calibration=calibration())
             asks = {key: value for key, value in request["params"].items() if key not in also}
-            self.assertEqual(asks, {"format": "ply", "density": "pixels", "coordinate_frame": "rig"})
+            self.assertEqual(asks, {"format": "ply", "density": "pixels", "coordinate_frame": "rig", **more})
             number = len(asked)
             asked.append(request)
             if number in dict(errors):
@@ -381,15 +391,18 @@ class Model(unittest.TestCase):
 
     def test_a_turntable_is_scanned_at_each_line(self):
         """Its first step of 30 degrees is more than the tracker follows unaided."""
-        views = [cloud(bumpy_ball, degrees, degrees) for degrees in range(0, 360, 30)]
-        scanner, asked = self.scanner(views)
-        done = subprocess.run((PROGRAM, "--socket", scanner.path, "--turntable", "--views", "12", "-o", self.folder / "t.ply",
-                               "--json"), input="\n" * 12, capture_output=True, text=True, timeout=600, check=False)
+        views = [coloured(cloud(bumpy_ball, degrees, degrees)) for degrees in range(0, 360, 30)]
+        scanner, asked = self.scanner(views, colour=True)
+        done = subprocess.run((PROGRAM, "--socket", scanner.path, "--turntable", "--views", "12", "--colour", "-o",
+                               self.folder / "t.ply", "--json"), input="\n" * 12, capture_output=True, text=True, timeout=600, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(len(asked), 12)
         self.assertEqual(len(json.loads(done.stdout)["fused"]), 12)
         self.assertIn("view 11 of 12 is placed; turn by 30 degrees, then press Enter", done.stderr)
-        self.assertLess(np.quantile(abs(off_truth_mm(mesh_ply((self.folder / "t.ply").read_bytes())[0])), 0.95), 0.15)
+        vertices = mesh_ply((self.folder / "t.ply").read_bytes())[0]
+        self.assertLess(np.quantile(abs(off_truth_mm(vertices)), 0.95), 0.15)
+        for name, level in (("red", 200), ("green", 100), ("blue", 50)):
+            self.assertLess(abs(vertices[name].astype(int) - level).max(), 2)
 
     def test_a_session_that_cannot_go_on_writes_the_model_so_far(self):
         scanner, _ = self.scanner(self.clouds[:6], {6: "not_calibrated"}.items())

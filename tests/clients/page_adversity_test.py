@@ -228,7 +228,7 @@ class Adversity(unittest.TestCase):
                 self.choose(browser, "colour", "symbol")
                 self.scan(browser, density)
                 symbol = ["symbol"] if density == "symbols" else []
-                self.assertEqual(browser.run(offered), ["z", "intensity", "sigma_mm", *symbol])
+                self.assertEqual(browser.run(offered), ["z", "intensity", "sigma_mm", *symbol, "own"])
                 self.assertEqual(browser.run("return [view.colour, document.getElementById('colour').value];"),
                                  2 * (symbol or ["z"]))
                 name = browser.run("return shownScan.scan;")
