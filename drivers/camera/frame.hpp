@@ -115,6 +115,7 @@ class Frame {
   /// Converts the frame into colours. Empty: the camera sees none, or the projector showed the pattern.
   /// @errors of read_image()
   [[nodiscard]] Result<ColourFrame> colours() const { return read_colours_ ? read_colours_() : ColourFrame(); }
+  [[nodiscard]] const std::function<Result<ColourFrame>()>& reader_of_colours() const { return read_colours_; }
   /// @param read  converts what it owns, because the driver gets its buffer back
   [[nodiscard]] Frame with_colours(std::function<Result<ColourFrame>()> read) && {
     read_colours_ = std::move(read);

@@ -25,7 +25,7 @@ MergedCamera merge_camera(std::size_t camera, const ScanSetup& setup, FrameSet& 
     const auto& [frame, longer] = taken[i];
     set.merged.push_back(std::move(merged.images[i]));
     *frame = Frame(set.merged.back().view(), frame->sequence(), frame->exposure_start(), (*longer)->received())
-                 .with_colours([shorter = std::make_shared<Frame>(std::move(*frame))] { return shorter->colours(); });
+                 .with_colours(frame->reader_of_colours());
     longer->reset();
   }
   return {setup.camera_names[camera], std::move(merged.problem)};

@@ -164,6 +164,28 @@ TEST_F(TwoExposures, AreTakenOfEachPictureInOrder) {
   EXPECT_EQ(cameras_[0]->exposures.back(), 1000) << "a single frame has the shorter exposure";
 }
 
+TEST_F(TwoExposures, GiveTheColoursOfTheShorterOneAndReturnItsBuffer) {
+  make({kTwo});
+  auto set = capture({.white = true});
+  ASSERT_TRUE(set) << to_string(set.error());
+  const auto buffer = std::make_shared<LentBuffers>(1);
+  for (auto& [frame, red] : {std::pair(&set->white[0], 20), std::pair(&*set->longer_white[0], 80)}) {
+    Frame coloured(frame->image(), 1, frame->exposure_start(), frame->received(),
+                   red == 20 ? buffer->lend(0) : FrameLease());
+    const ColourFrame colours(1600, 1200, {static_cast<std::uint16_t>(red), 30, 40});
+    *frame = std::move(coloured).with_colours([colours] { return colours; });
+  }
+  ASSERT_TRUE(buffer->is_lent(0));
+  EXPECT_EQ(merge_frames(*set, *setup_).at(0).problem, "");
+  EXPECT_FALSE(buffer->is_lent(0)) << "the driver needs it";
+  ScanRequest request;
+  request.texture = request.colour = true;
+  const auto result = reconstruct(*set, *setup_, 0, request, "scan");
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_GT(result->cloud.points.size(), 1000U);
+  for (const CloudPoint& point : result->cloud.points) ASSERT_EQ(point.colour, (Rgb{20, 30, 40}));
+}
+
 TEST_F(TwoExposures, ConcernOnlyCamerasThatHaveThem) {
   make({{}, kTwo});
   auto set = capture();
