@@ -20,8 +20,8 @@ namespace {
 /// Cells around a part that must be decoded for its symbols to be those of the whole frame. A symbol's place depends on
 /// bends over two cells, averaged with its neighbours' (three cells); the symbols there on their 3x3 windows (four),
 /// and these on the links of their outermost symbols (five). Of 6017 symbols in 40 parts of a frame of a plane, 135
-/// differ in their last digits with four cells, and none with five or more. On seven other frames with known truth, two
-/// to six cells give the same number of points within 0.2 %, none wrong.
+/// differ in their last digits with four cells, and none with five or more. On seven frames of the corpus, two, three,
+/// four and six cells give the same number of points within 0.2 %.
 constexpr float kCellsAround = 5;
 
 }  // namespace
