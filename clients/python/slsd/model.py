@@ -27,7 +27,8 @@ class Mesh:
     """A surface of triangles.
 
     points     structured array, one record for each vertex: x y z (mm, the scanner's frame at the first cloud), sigma_mm,
-               red green blue (the intensity, if the clouds have no colours), frames (how many clouds measured it; 0: invented by `close`)
+               red green blue (the intensity, if the clouds have no colours), frames (how many clouds measured it; 0:
+               invented by `close`)
     triangles  N x 3 array of indices of vertices, counter-clockwise as seen from outside
     report     of slsd-model: `fused` and `refused` clouds, `closed`, `drift_mm`, `seam_mm`, `invented_share`, ...
     """

@@ -79,12 +79,11 @@ class Scanner:
 
     def scan(self, *, timeout_s: float | None = 5.0, density: Density | None = None, normals: bool = False,
              texture: bool = False, colour: bool = False, ambient: bool = False, picture: bool = False,
-             camera: str | None = None,
-             frames: bool = False, shared: bool = True, why: bool = False, preset: str | None = None,
-             coordinate_frame: Literal["rig", "robot_base"] | None = None, robot_pose: Sequence[float] | None = None,
-             poses: str | None = None, box: Sequence[float] | None = None, plane: Sequence[float] | None = None,
-             box_frame: Literal["rig", "robot_base"] | None = None, voxel_mm: float | None = None,
-             stride: int | None = None) -> Cloud:
+             camera: str | None = None, frames: bool = False, shared: bool = True, why: bool = False,
+             preset: str | None = None, coordinate_frame: Literal["rig", "robot_base"] | None = None,
+             robot_pose: Sequence[float] | None = None, poses: str | None = None, box: Sequence[float] | None = None,
+             plane: Sequence[float] | None = None, box_frame: Literal["rig", "robot_base"] | None = None,
+             voxel_mm: float | None = None, stride: int | None = None) -> Cloud:
         """Takes one scan.
 
         density  "symbols": a point for each symbol of the pattern; "pixels": one for each camera pixel; None: as
@@ -113,9 +112,8 @@ class Scanner:
         """
         params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, colour=colour, ambient=ambient,
-                         picture=picture,
-                         camera=camera, frames="raw" if frames else None, why=why, coordinate_frame=coordinate_frame,
-                         robot_pose=_numbers(robot_pose), poses=poses,
+                         picture=picture, camera=camera, frames="raw" if frames else None, why=why,
+                         coordinate_frame=coordinate_frame, robot_pose=_numbers(robot_pose), poses=poses,
                          box=_numbers(box), plane=_numbers(plane), box_frame=box_frame, voxel_mm=voxel_mm, stride=stride)
         answer = self._call("scan", params, timeout_s)
         cloud = read_ply(_need(answer, "the cloud"), answer.result)

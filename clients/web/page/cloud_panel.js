@@ -57,7 +57,7 @@ function drawShown() {
   if (!isMap()) {
     view.drawDistances(measurements);
     if (view.showsOwn()) $("scale").replaceChildren(element("span", "colour of the surface in white light", "unit"));
-    else showColourBar($("scale"), view.range, view.colour === "intensity", kUnits[view.colour] || kUnits.own);
+    else showColourBar($("scale"), view.range, view.colour === "intensity", kUnits[view.colour]);
     return;
   }
   drawMap().then(() => say("map", null), (error) => say("map", error));
