@@ -9,6 +9,7 @@
 
 #include "core/cloud/coordinate_frame.hpp"
 #include "core/cloud/point_record.hpp"
+#include "core/colour.hpp"
 
 namespace slsd {
 namespace {
@@ -126,9 +127,9 @@ Eigen::Vector3f DensePcd::in_rig(std::string_view record) const {
 }
 
 Rgb DensePcd::colour_of(std::string_view record) const {
-  const std::string_view bytes = record.substr(record.size() - kPcdColourBytes);
-  return {static_cast<std::uint8_t>(bytes[2]), static_cast<std::uint8_t>(bytes[1]),
-          static_cast<std::uint8_t>(bytes[0])};
+  std::uint32_t number;
+  std::memcpy(&number, record.data() + record.size() - kPcdColourBytes, sizeof number);
+  return unpacked(number);
 }
 
 std::string DensePcd::to_ply(const DenseFacts& facts) const {

@@ -10,6 +10,8 @@
 #include <cstring>
 #include <limits>
 
+#include "core/colour.hpp"
+
 namespace slsd {
 namespace {
 
@@ -65,7 +67,8 @@ void append_colour(const Rgb& colour, std::string& bytes) {
 }
 
 void append_pcd_colour(const Rgb& colour, std::string& bytes) {
-  bytes.append({static_cast<char>(colour[2]), static_cast<char>(colour[1]), static_cast<char>(colour[0]), '\0'});
+  const std::uint32_t number = packed(colour);
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
 }
 
 std::optional<CloudPoint> read_point(const char* bytes) {

@@ -9,8 +9,6 @@
 namespace slsd {
 namespace {
 
-constexpr double kSaturated = 0.985;  // of full: noise and uneven sensor response keep some pixels below
-
 /// Levels of an image at a position between four pixels.
 struct Sample {
   double level = 0;    ///< interpolated
@@ -47,14 +45,16 @@ Sample sample(const GreyView& image, const CloudPoint& point) {
   return std::visit([&](const auto& pixels) { return sample(pixels, point.camera_u, point.camera_v); }, image);
 }
 
-std::array<double, 3> sample(const ColourFrame& colours, const CloudPoint& point) {
+ColourSample sample(const ColourFrame& colours, const CloudPoint& point) {
   const Between between(colours.width(), colours.height(), point.camera_u, point.camera_v);
-  std::array<double, 3> levels{};
-  for (std::size_t i = 0; i < levels.size(); ++i)
-    levels[i] =
-        between.blend(colours.at(between.left, between.top)[i], colours.at(between.right, between.top)[i],
-                      colours.at(between.left, between.bottom)[i], colours.at(between.right, between.bottom)[i]);
-  return levels;
+  ColourSample sample;
+  for (std::size_t i = 0; i < sample.levels.size(); ++i) {
+    const double a = colours.at(between.left, between.top)[i], b = colours.at(between.right, between.top)[i];
+    const double c = colours.at(between.left, between.bottom)[i], d = colours.at(between.right, between.bottom)[i];
+    sample.levels[i] = between.blend(a, b, c, d);
+    sample.highest = std::max({sample.highest, a, b, c, d});
+  }
+  return sample;
 }
 
 std::uint8_t intensity(double share) {
@@ -63,10 +63,11 @@ std::uint8_t intensity(double share) {
 
 }  // namespace
 
-Rgb colour_of(const std::array<double, 3>& white, const std::array<double, 3>& dark, const SceneLight& light) {
+Rgb colour_of(const ColourSample& white, const ColourSample& dark, const SceneLight& light, bool& saturated) {
+  if (white.highest >= kSaturatedShare * light.colour_full) return saturated = true, grey_of(255);
   Rgb colour{};
   for (std::size_t i = 0; i < colour.size(); ++i)
-    colour[i] = intensity(light.gains[i] * (white[i] - dark[i]) / light.colour_full);
+    colour[i] = intensity(light.gains[i] * (white.levels[i] - dark.levels[i]) / light.colour_full);
   return colour;
 }
 
@@ -79,13 +80,14 @@ std::size_t shade_points(std::span<CloudPoint> points, const SceneLight& light) 
       continue;
     }
     const Sample white = sample(*light.white, point);
-    const bool clipped = white.highest >= kSaturated * light.full;
+    bool clipped = white.highest >= kSaturatedShare * light.full;
     point.intensity = clipped ? 255 : intensity((white.level - ambient) / light.full);
+    point.colour = grey_of(point.intensity);
+    if (light.white_colours != nullptr) {
+      const ColourSample of_room = light.dark_colours == nullptr ? ColourSample() : sample(*light.dark_colours, point);
+      point.colour = colour_of(sample(*light.white_colours, point), of_room, light, clipped);
+    }
     saturated += clipped ? 1 : 0;
-    point.colour = {point.intensity, point.intensity, point.intensity};
-    if (light.white_colours == nullptr) continue;
-    const auto of_room = light.dark_colours == nullptr ? std::array<double, 3>{} : sample(*light.dark_colours, point);
-    point.colour = colour_of(sample(*light.white_colours, point), of_room, light);
   }
   return saturated;
 }

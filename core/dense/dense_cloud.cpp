@@ -14,6 +14,7 @@
 #include "core/clones.hpp"
 #include "core/cloud/dense_file.hpp"
 #include "core/cloud/point_record.hpp"
+#include "core/colour.hpp"
 #include "core/lanes.hpp"
 
 namespace slsd {
@@ -22,8 +23,6 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "the records are copied as they lie in memory");
 
 constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
-/// Share of the full level above which a pixel is saturated: noise and uneven pixels keep some below the full level.
-constexpr double kSaturated = 0.985;
 /// Largest change of white by print and shading that most pixels have within the window of a fit.
 constexpr double kWhiteOff = 0.3;
 
@@ -139,11 +138,6 @@ void put_point(char*& to, const DenseView& view, const RowPlaces& row, const Vie
   if (normals) put(to, points.normal(x, y));
 }
 
-/// A colour as a PCD has it.
-std::uint32_t packed(const Rgb& colour) {
-  return std::uint32_t{colour[0]} << 16 | std::uint32_t{colour[1]} << 8 | colour[2];
-}
-
 /// Tells whether a pixel of the image has a point.
 bool has_point(const DenseView& view, int x, int y) {
   return x < view.map.width && view.map.measured(static_cast<std::size_t>(y) * view.map.width + x);
@@ -192,10 +186,12 @@ std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured) 
   constexpr int kSteps = 128, kPerUnit = 32;
   std::array<std::size_t, kSteps> ratios{};
   view.colours.assign(coloured ? view.map.pixels.size() : 0, Rgb{});
-  const auto levels = [](const ColourFrame* colours, int x, int y) {
-    std::array<double, 3> levels{};
-    if (colours != nullptr) std::ranges::copy(colours->at(x, y), levels.begin());
-    return levels;
+  const auto sample = [](const ColourFrame* colours, int x, int y) {
+    ColourSample sample;
+    if (colours == nullptr) return sample;
+    std::ranges::copy(colours->at(x, y), sample.levels.begin());
+    sample.highest = std::ranges::max(sample.levels);
+    return sample;
   };
   for (int y = 0; y < view.map.height; ++y) {
     for (int x = 0; x < view.map.width; ++x) {
@@ -204,16 +200,18 @@ std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured) 
       const double dark = light.dark ? level(*light.dark, x, y) : 0;
       const double of_pattern = view.map.intensity[pixel] / 255.0 * light.full;
       const double white = light.white ? level(*light.white, x, y) : of_pattern;
-      const bool clipped = light.white && white >= kSaturated * light.full;
-      saturated += clipped;
+      const bool clipped = light.white && white >= kSaturatedShare * light.full;
+      bool unknown = clipped;
       if (!clipped) ++ratios[std::min(kSteps - 1, static_cast<int>(kPerUnit * white / std::max(of_pattern, 1.0)))];
       const double share = clipped ? 1 : (white - dark) / light.full;
       const auto intensity = static_cast<std::uint8_t>(std::lround(std::clamp(255 * share, 0.0, 255.0)));
       view.map.intensity[pixel] = intensity;
-      if (!coloured) continue;
-      view.colours[pixel] = light.white_colours == nullptr
-                                ? Rgb{intensity, intensity, intensity}
-                                : colour_of(levels(light.white_colours, x, y), levels(light.dark_colours, x, y), light);
+      if (coloured)
+        view.colours[pixel] =
+            light.white_colours == nullptr
+                ? grey_of(intensity)
+                : colour_of(sample(light.white_colours, x, y), sample(light.dark_colours, x, y), light, unknown);
+      saturated += unknown;
     }
   }
   std::size_t all = 0, usual = 0;

@@ -42,7 +42,7 @@ struct DenseCloud {
 /// Gives measured pixels the intensity of the white frame, as shade_points() does for symbols, and their colour if it
 /// is wanted. Also counts pixels at which white differs from what the pattern's frame predicts, because something moved
 /// between the two.
-/// @return number of saturated pixels
+/// @return number of pixels whose intensity or colour is saturated
 std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured = false);
 
 // Binary, little-endian; normals, which face the camera, add 12 bytes a point. Points are in the robot's base with

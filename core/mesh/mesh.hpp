@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "core/image.hpp"
+#include "core/colour.hpp"
 
 namespace slsd {
 
@@ -26,8 +26,12 @@ struct Mesh {
   [[nodiscard]] bool shows_colour() const { return !colours.empty() || !intensity.empty(); }
   /// The colour that files show of a vertex.
   [[nodiscard]] Rgb shown_colour(std::size_t vertex) const {
-    return colours.empty() ? Rgb{intensity[vertex], intensity[vertex], intensity[vertex]} : colours[vertex];
+    return colours.empty() ? grey_of(intensity[vertex]) : colours[vertex];
   }
 };
+
+/// The normal of each vertex towards the outside: the sum of those of its triangles, each as long as twice its area.
+/// @thread reentrant
+[[nodiscard]] std::vector<Eigen::Vector3f> normals_of(const Mesh& mesh);
 
 }  // namespace slsd

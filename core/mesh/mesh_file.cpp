@@ -147,9 +147,6 @@ std::string write_glb(const Mesh& mesh, std::string_view title) {
   const GlbSizes sizes(mesh.vertices_mm.size(), mesh.triangles.size());
   std::string description = gltf_description(mesh, title, sizes);
   description.resize((description.size() + 3) / 4 * 4, ' ');
-  std::vector<Eigen::Vector3f> normals(mesh.vertices_mm.size(), Eigen::Vector3f::Zero());
-  for (const Triangle& triangle : mesh.triangles)
-    for (const std::uint32_t corner : triangle) normals[corner] += cross_of(mesh, triangle);
   std::string bytes;
   bytes.reserve(28 + description.size() + sizes.all());
   bytes.append("glTF\2\0\0\0\0\0\0\0", 12);
@@ -159,7 +156,7 @@ std::string write_glb(const Mesh& mesh, std::string_view title) {
   put(bytes, static_cast<std::uint32_t>(data));
   bytes.append("BIN\0", 4);
   for (const Eigen::Vector3f& vertex : mesh.vertices_mm) put(bytes, gltf_place(vertex));
-  for (const Eigen::Vector3f& normal : normals) {
+  for (const Eigen::Vector3f& normal : normals_of(mesh)) {
     const Eigen::Vector3f unit = normal.squaredNorm() > 0 ? normal.normalized() : Eigen::Vector3f(0, 0, -1);
     put(bytes, Eigen::Vector3f(unit.x(), -unit.y(), -unit.z()));
   }

@@ -15,6 +15,8 @@
 #include <Eigen/Geometry>
 
 #include "clients/model/mesh/close_field.hpp"
+#include "core/colour.hpp"
+#include "core/mesh/mesh.hpp"
 
 namespace slsd::model {
 namespace {
@@ -45,20 +47,6 @@ struct VoxelFacts {
   }
   [[nodiscard]] bool empty() const { return passed > kSeenThrough * measured; }
 };
-
-/// Mean colour of a voxel, packed as a PCD packs it.
-struct VoxelColour {
-  static std::int32_t packed(const Rgb& colour) { return colour[0] << 16 | colour[1] << 8 | colour[2]; }
-  static Rgb of(std::int32_t packed) {
-    return {static_cast<std::uint8_t>(packed >> 16), static_cast<std::uint8_t>(packed >> 8),
-            static_cast<std::uint8_t>(packed)};
-  }
-};
-
-Rgb grey_of(unsigned intensity) {
-  const auto level = static_cast<std::uint8_t>(intensity);
-  return {level, level, level};
-}
 
 /// A voxel's place on a surface: the plane of the pixel that sees it.
 struct PixelPlane {
@@ -189,12 +177,13 @@ struct Leaves {
 
 /// Moves the mean colour of a voxel towards another by its share. A voxel without one begins with its intensity.
 void blend_colour(FactsLeaf& leaf, openvdb::Index at, unsigned intensity, const Rgb& seen, float share) {
-  Rgb mean = leaf.isValueOn(at) ? VoxelColour::of(leaf.getValue(at)) : grey_of(intensity);
+  Rgb mean = leaf.isValueOn(at) ? unpacked(static_cast<std::uint32_t>(leaf.getValue(at)))
+                                : grey_of(static_cast<std::uint8_t>(intensity));
   for (std::size_t i = 0; i < mean.size(); ++i) {
     const float level = mean[i];
     mean[i] = static_cast<std::uint8_t>(std::lround(level + share * (static_cast<float>(seen[i]) - level)));
   }
-  leaf.setValueOn(at, VoxelColour::packed(mean));
+  leaf.setValueOn(at, static_cast<std::int32_t>(packed(mean)));
 }
 
 /// Adds what a surface says of one voxel.
@@ -364,8 +353,9 @@ class VertexReader {
       frames += corner.share * static_cast<float>(facts.measured);
       intensity += corner.share * static_cast<float>(facts.intensity);
       if (!colour_) continue;
-      std::int32_t packed = 0;
-      const Rgb seen = colour_->probeValue(corner.at, packed) ? VoxelColour::of(packed) : grey_of(facts.intensity);
+      std::int32_t number = 0;
+      const Rgb seen = colour_->probeValue(corner.at, number) ? unpacked(static_cast<std::uint32_t>(number))
+                                                              : grey_of(static_cast<std::uint8_t>(facts.intensity));
       colour += corner.share * Eigen::Vector3f(seen[0], seen[1], seen[2]);
     }
     return Vertex{1 / std::sqrt(weights), frames, intensity, colour};

@@ -31,17 +31,6 @@ float cell_width_mm(const Shot& shot) {
   return static_cast<float>(kCellSteps.back() * middle.z() / image.lens.fx);
 }
 
-/// Normals of vertices, as long as the area around each.
-std::vector<Eigen::Vector3f> normals_of(const Mesh& mesh) {
-  std::vector<Eigen::Vector3f> normals(mesh.vertices_mm.size(), Eigen::Vector3f::Zero());
-  for (const auto& triangle : mesh.triangles) {
-    const Eigen::Vector3f& first = mesh.vertices_mm[triangle[0]];
-    const Eigen::Vector3f cross = (mesh.vertices_mm[triangle[1]] - first).cross(mesh.vertices_mm[triangle[2]] - first);
-    for (const std::uint32_t vertex : triangle) normals[vertex] += cross;
-  }
-  return normals;
-}
-
 }  // namespace
 
 PreviewPoints::Key PreviewPoints::key_of(const Eigen::Vector3f& place_mm) const {

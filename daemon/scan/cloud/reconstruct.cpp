@@ -118,11 +118,14 @@ void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& re
   if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
 }
 
-/// The factors that make the mean colour of these points grey. Empty: the mean lacks a colour.
+/// The factors that make the mean colour of these points grey. Empty: the mean lacks a colour. Saturated points are
+/// left out.
 std::optional<ColourGains> white_balance_of(std::span<const CloudPoint> points, const ColourGains& applied) {
   ColourGains sums{};
-  for (const CloudPoint& point : points)
+  for (const CloudPoint& point : points) {
+    if (std::ranges::max(point.colour) == 255) continue;
     for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += point.colour[i] / applied[i];
+  }
   if (std::ranges::any_of(sums, [](double sum) { return sum <= 0; })) return std::nullopt;
   return ColourGains{sums[1] / sums[0], 1, sums[1] / sums[2]};
 }

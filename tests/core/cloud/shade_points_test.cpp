@@ -65,6 +65,19 @@ TEST(ShadePoints, TakesColoursBetweenPixelsLessThoseOfTheRoomTimesTheGains) {
   EXPECT_EQ(points[0].colour, (Rgb{14, 20, 71}));
 }
 
+// Green alone is saturated, as white light makes it first; the grey does not show it.
+TEST(ShadePoints, MakesAPointWhiteAndCountsItIfOneColourIsSaturated) {
+  const Grey8 white(8, 6, 180);
+  ColourFrame colours(8, 6, {100, 200, 120});
+  colours.at(4, 3) = {110, 254, 130};
+  std::vector<CloudPoint> points{seen_at(3, 1), seen_at(4, 3), seen_at(3.5F, 2.5F)};
+  EXPECT_EQ(shade_points(points, {.white = white.view(), .white_colours = &colours, .gains = {0.5, 0.5, 0.5}}), 2U);
+  EXPECT_EQ(points[0].colour, (Rgb{50, 100, 60}));
+  EXPECT_EQ(points[1].colour, (Rgb{255, 255, 255}));
+  EXPECT_EQ(points[2].colour, (Rgb{255, 255, 255}));
+  EXPECT_EQ(points[1].intensity, 180);
+}
+
 TEST(ShadePoints, TakesTheIntensityAsColourOfACameraWithoutColours) {
   const Grey8 white = slope<std::uint8_t>(1);
   std::vector<CloudPoint> points{seen_at(3, 2)};

@@ -82,6 +82,20 @@ TEST(Reconstruct, GivesPointsTheColoursOfTheWhiteFrame) {
   EXPECT_EQ(result->white_balance.front().gains, (ColourGains{2, 1, 20.0 / 30}));
 }
 
+TEST(Reconstruct, LeavesSaturatedPointsOutOfTheWhiteBalance) {
+  ColourFrame half(1600, 1200, {10, 20, 40});
+  for (int y = 0; y < 1200; ++y)
+    for (int x = 800; x < 1600; ++x) half.at(x, y) = {200, 255, 255};
+  const auto result = scan_colours(half);
+  ASSERT_TRUE(result) << to_string(result.error());
+  ASSERT_EQ(result->white_balance.size(), 1U);
+  EXPECT_EQ(result->white_balance.front().gains, (ColourGains{2, 1, 0.5}));
+  EXPECT_GT(result->saturated, result->cloud.points.size() / 4);
+  const auto all = scan_colours(ColourFrame(1600, 1200, {200, 255, 255}));
+  ASSERT_TRUE(all) << to_string(all.error());
+  EXPECT_THAT(all->white_balance, ::testing::IsEmpty());
+}
+
 // A file may change between its frame and its colours.
 TEST(Reconstruct, RefusesColoursThatDoNotFitTheFrame) {
   for (const auto& [colours, code] :
