@@ -57,7 +57,7 @@ Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 Decoder::~Decoder() = default;
 
 Result<Decoder> Decoder::create(const IndexedPattern& indexed, const Calibration& calibration, std::size_t camera_index,
-                                const DecodeOptions& options) {
+                                const DecodeOptions& options, const Decoder* earlier) {
   if (auto valid = options.validate(); !valid) return tl::unexpected(valid.error());
   if (camera_index >= calibration.cameras.size()) {
     return fail(ErrorCode::kInvalidArgument, "the calibration has no camera " + std::to_string(camera_index));
@@ -87,7 +87,8 @@ Result<Decoder> Decoder::create(const IndexedPattern& indexed, const Calibration
       Parts{.camera = camera,
             .camera_index = static_cast<std::uint8_t>(camera_index),
             .options = options,
-            .reader = SymbolReader(indexed, projector, std::move(expected), options, std::move(paper)),
+            .reader = SymbolReader(indexed, projector, std::move(expected), options, std::move(paper),
+                                   earlier != nullptr ? earlier->parts_->reader.appearances() : nullptr),
             .view = EpipolarView(camera, projector, options.depth_min_mm, options.depth_max_mm,
                                  epipolar_gate_px(calibration.report.epipolar_error_px)),
             .triangulator = Triangulator(camera, projector),

@@ -39,10 +39,12 @@ class Decoder {
  public:
   /// Prepares the prototypes and the rays of the pattern's cells.
   /// @param pattern  one for all cameras that see it, which share its contents
+  /// @param earlier  shares its prototypes if its symbols and scale are the same, and may be at work; null: none
   /// @errors kMismatch: the calibration's projector differs in size from the pattern; kInvalidArgument; kUnsupported:
   ///         the camera's images are too large
   [[nodiscard]] static Result<Decoder> create(const IndexedPattern& pattern, const Calibration& calibration,
-                                              std::size_t camera_index, const DecodeOptions& options);
+                                              std::size_t camera_index, const DecodeOptions& options,
+                                              const Decoder* earlier = nullptr);
   /// Makes an equal decoder for another thread, in a hundredth of the time. It shares constant data, and its buffers
   /// start at the size of these.
   [[nodiscard]] Decoder another() const;

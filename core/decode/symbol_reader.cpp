@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -32,15 +33,19 @@ std::vector<Prototype> with_centroids_of(Method centre, const Pattern& pattern, 
 
 }  // namespace
 
-SymbolReader::Fixed::Fixed(const IndexedPattern& shown, const Lens& projector, Method centre, float scale)
+SymbolReader::Fixed::Fixed(const IndexedPattern& shown, const Lens& projector, Method centre,
+                           std::shared_ptr<const Appearances> looks)
     : pattern(shown),
-      appearances(shown.pattern().options, scale),
-      cells(shown.pattern(), with_centroids_of(centre, shown.pattern(), appearances.usual().as_measured), projector) {}
+      appearances(std::move(looks)),
+      cells(shown.pattern(), with_centroids_of(centre, shown.pattern(), appearances->usual().as_measured), projector) {}
 
 SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector, ExpectedFrames expected,
-                           const DecodeOptions& options, std::optional<PaperWay> paper)
+                           const DecodeOptions& options, std::optional<PaperWay> paper,
+                           std::shared_ptr<const Appearances> known)
     : options_(options),
-      fixed_(std::make_shared<const Fixed>(indexed, projector, options.centre, expected.in_the_middle().scale)),
+      fixed_(std::make_shared<const Fixed>(
+          indexed, projector, options.centre,
+          Appearances::shared(indexed.pattern().options, expected.in_the_middle().scale, std::move(known)))),
       paper_(std::move(paper)),
       finder_(pattern().options, std::move(expected), options.binarize, options.find_regions, Rules(options.trial)),
       linker_({.pitch_px = static_cast<float>(pattern().pitch_px())}),
@@ -49,7 +54,7 @@ SymbolReader::SymbolReader(const IndexedPattern& indexed, const Lens& projector,
       letters_(std::make_shared<const LetterFields>(pattern().options)),
       recovery_(indexed, letters_, Rules(options.trial)),
       correspondence_(Rules(options.trial)),
-      centre_correction_(fixed_->appearances.usual().as_measured, static_cast<float>(pattern().pitch_px()),
+      centre_correction_(fixed_->appearances->usual().as_measured, static_cast<float>(pattern().pitch_px()),
                          static_cast<float>(pattern().options.symbol_size_px)) {}
 
 const Lattice& SymbolReader::read(const GreyView& frame, double full, EpipolarView* view, Executor& executor,
@@ -84,11 +89,11 @@ void SymbolReader::measure_look() {
     if (!node.measured_u || !node.measured_v) continue;
     sample_.push_back(shape_features(seen_.moments[i], node.frame.inverse(), size));
   }
-  look_ = &fixed_->appearances.likeliest(sample_);
+  look_ = &fixed_->appearances->likeliest(sample_);
 }
 
 void SymbolReader::classify(Executor& executor) {
-  look_ = &fixed_->appearances.usual();
+  look_ = &fixed_->appearances->usual();
   const float size = static_cast<float>(pattern().options.symbol_size_px);
   seen_.shapes.resize(seen_.size());
   seen_.nodes.assign(seen_.size(), {});

@@ -36,8 +36,10 @@ class SymbolReader {
   /// @param expected   local frames of the pattern, to half a step of the grid
   /// @param projector  the projector whose pixels the symbols are
   /// @param paper      null unless a stage uses the paper's method
+  /// @param known      shared if they fit; may be null
   SymbolReader(const IndexedPattern& pattern, const Lens& projector, ExpectedFrames expected,
-               const DecodeOptions& options, std::optional<PaperWay> paper);
+               const DecodeOptions& options, std::optional<PaperWay> paper,
+               std::shared_ptr<const Appearances> known = nullptr);
 
   /// Replaces the expected frames by others of the same scale, to an eighth.
   void expect(ExpectedFrames expected) { finder_.expect(std::move(expected)); }
@@ -65,6 +67,7 @@ class SymbolReader {
   /// Reports the status of every region, with the counters.
   void report(Decoding& decoding) const;
 
+  [[nodiscard]] const std::shared_ptr<const Appearances>& appearances() const { return fixed_->appearances; }
   [[nodiscard]] const Pattern& pattern() const { return fixed_->pattern.pattern(); }
   /// Returns the noise of the last frame.
   [[nodiscard]] const FrameNoise& noise() const { return noise_; }
@@ -77,9 +80,10 @@ class SymbolReader {
  private:
   struct Fixed {
     IndexedPattern pattern;
-    Appearances appearances;
+    std::shared_ptr<const Appearances> appearances;
     CellRays cells;
-    Fixed(const IndexedPattern& pattern, const Lens& projector, Method centre, float scale);
+    Fixed(const IndexedPattern& pattern, const Lens& projector, Method centre,
+          std::shared_ptr<const Appearances> appearances);
   };
 
   void measure_look();

@@ -62,12 +62,15 @@ Result<> warm_up(Decoder& decoder, const Lens& lens, const Grey8& symbols, Crew&
 
 // Each gets its own thread, because each takes some hundredths of a second.
 Result<std::vector<Decoder>> make_lane(const ScanSetup& setup, const std::vector<std::size_t>& cameras,
-                                       const DecodeOptions& options) {
+                                       const DecodeOptions& options, const ScanSetup* earlier) {
   const IndexedPattern pattern(setup.pattern);
   std::vector<std::future<Result<Decoder>>> prepared;
   for (const std::size_t index : cameras) {
-    prepared.push_back(std::async(std::launch::async, [&, index]() -> Result<Decoder> {
-      auto decoder = Decoder::create(pattern, *setup.calibration, index, options);
+    const std::size_t camera = prepared.size();
+    const bool was = earlier != nullptr && !earlier->lanes.empty() && camera < earlier->lanes.front().size();
+    const Decoder* like = was ? &earlier->lanes.front()[camera] : nullptr;
+    prepared.push_back(std::async(std::launch::async, [&, index, like]() -> Result<Decoder> {
+      auto decoder = Decoder::create(pattern, *setup.calibration, index, options, like);
       if (!decoder) return decoder;
       const auto warm = warm_up(*decoder, setup.calibration->cameras[index].lens, setup.image, *setup.crew);
       if (!warm) return tl::unexpected(warm.error());
@@ -181,14 +184,14 @@ DenseMapper& DenseMappers::of(std::size_t lane, std::size_t camera, const Decode
   return *mapper;
 }
 
-Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::size_t lanes) {
+Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::size_t lanes, const ScanSetup* earlier) {
   auto pattern = configured_pattern(configuration);
   if (!pattern) return tl::unexpected(pattern.error());
   auto calibration = configured_calibration(configuration);
   if (!calibration) return tl::unexpected(calibration.error());
   auto hand_eye = configured_hand_eye(configuration);
   if (!hand_eye) return tl::unexpected(hand_eye.error());
-  auto setup = of(std::move(*pattern), std::move(*calibration), configuration, lanes);
+  auto setup = of(std::move(*pattern), std::move(*calibration), configuration, lanes, earlier);
   if (!setup) return setup;
   setup->hand_eye = std::move(*hand_eye);
   // A box that moves with the robot is checked with each pose.
@@ -200,7 +203,7 @@ Result<ScanSetup> ScanSetup::create(const Configuration& configuration, std::siz
 }
 
 Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> calibration,
-                                const Configuration& configuration, std::size_t lanes) {
+                                const Configuration& configuration, std::size_t lanes, const ScanSetup* earlier) {
   ScanSetup setup{std::move(pattern), {}, std::move(calibration), {}, {}, configuration.other_hardware};
   for (const CameraOptions& camera : configuration.cameras) {
     setup.camera_names.push_back(camera.name());
@@ -216,7 +219,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   const auto cameras = calibrated_cameras(*setup.calibration, configuration);
   if (!cameras) return tl::unexpected(cameras.error());
   setup.doubts = calibration_doubts(*setup.calibration, {setup.depth_min_mm, setup.depth_max_mm});
-  auto first = make_lane(setup, *cameras, configuration.decode);
+  auto first = make_lane(setup, *cameras, configuration.decode, earlier);
   if (!first) return tl::unexpected(first.error());
   for (std::size_t lane = 1; lane < lanes; ++lane) setup.lanes.push_back(another_lane(*first));
   if (lanes > 0) setup.lanes.push_back(std::move(*first));

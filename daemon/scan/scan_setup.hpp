@@ -106,13 +106,16 @@ struct ScanSetup {
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
   std::optional<HandEyeCalibration> hand_eye = {};
 
-  /// @param lanes  number of decoding threads
+  /// @param lanes    number of decoding threads
+  /// @param earlier  makes this one sooner if the pattern's symbols and the calibration stay; may be at work, or null
   /// @errors of the two above; of Decoder::create()
-  [[nodiscard]] static Result<ScanSetup> create(const Configuration& configuration, std::size_t lanes);
+  [[nodiscard]] static Result<ScanSetup> create(const Configuration& configuration, std::size_t lanes,
+                                                const ScanSetup* earlier = nullptr);
 
   /// Makes a setup from an existing pattern and calibration. @errors kMismatch; of Decoder::create()
   [[nodiscard]] static Result<ScanSetup> of(Pattern pattern, std::optional<Calibration> calibration,
-                                            const Configuration& configuration, std::size_t lanes);
+                                            const Configuration& configuration, std::size_t lanes,
+                                            const ScanSetup* earlier = nullptr);
 
   /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of this name;
   ///         errors of part_of()

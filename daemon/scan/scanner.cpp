@@ -373,15 +373,15 @@ void Scanner::reload(const std::filesystem::path& file, const Configuration& run
         with_devices.pattern.projector_width_px = running.projector.width_px;
         with_devices.pattern.projector_height_px = running.projector.height_px;
         with_devices.cameras = running.cameras;
-        auto made = ScanSetup::create(with_devices, DecodeLanes::lanes_here());
+        auto made = ScanSetup::create(with_devices, DecodeLanes::lanes_here(), setup().get());
         if (!made) return answer(tl::unexpected(made.error()));
-        auto setup = std::make_shared<ScanSetup>(std::move(*made));
+        auto replacement = std::make_shared<ScanSetup>(std::move(*made));
         auto taken = set_exposures(running.cameras, with_exposures_of(running.cameras, configuration->cameras),
                                    running.scan.camera_settings_time());
         if (!taken) return answer(tl::unexpected(taken.error()));
         {
           const std::lock_guard lock(mutex_);
-          setup_.swap(setup);
+          setup_.swap(replacement);
         }
         queue_.wake();
         answer(configuration);

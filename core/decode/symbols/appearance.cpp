@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <tuple>
 #include <utility>
 
 #include "core/geometry/robust.hpp"
@@ -47,6 +48,16 @@ Appearances::Appearances(const PatternOptions& pattern, float camera_px_per_proj
     : pattern_(pattern),
       scale_(camera_px_per_projector_px),
       usual_(std::move(make_appearances(pattern, camera_px_per_projector_px, kAnyBlur).front())) {}
+
+std::shared_ptr<const Appearances> Appearances::shared(const PatternOptions& pattern, float camera_px_per_projector_px,
+                                                       std::shared_ptr<const Appearances> known) {
+  const auto symbols_of = [](const PatternOptions& of) {
+    return std::tie(of.symbols, of.symbol_size_px, of.spacing_px);
+  };
+  if (known && known->scale_ == camera_px_per_projector_px && symbols_of(known->pattern_) == symbols_of(pattern))
+    return known;
+  return std::make_shared<const Appearances>(pattern, camera_px_per_projector_px);
+}
 
 const std::vector<Appearance>& Appearances::of_blurs() const {
   std::call_once(made_, [&] {

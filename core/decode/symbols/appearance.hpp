@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -31,6 +32,12 @@ struct Appearance {
 class Appearances {
  public:
   Appearances(const PatternOptions& pattern, float camera_px_per_projector_px);
+  /// Returns the known appearances if they are of this pattern's symbols at this scale, and makes new ones otherwise,
+  /// which takes tenths of a second.
+  /// @param known  may be null
+  [[nodiscard]] static std::shared_ptr<const Appearances> shared(const PatternOptions& pattern,
+                                                                 float camera_px_per_projector_px,
+                                                                 std::shared_ptr<const Appearances> known);
 
   /// Returns the appearance over every blur that occurs, for uses that do not depend on it.
   [[nodiscard]] const Appearance& usual() const { return usual_; }

@@ -9,6 +9,7 @@
 #include <random>
 #include <thread>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -306,6 +307,20 @@ TEST(AnotherDecoder, OutlivesTheFirst) {
   Decoder second = first->another();
   first.reset();
   EXPECT_TRUE(same_points(decode(second, frame.view()), expected));
+}
+
+TEST(CreateDecoder, GivesTheSamePointsBesideAnEarlierDecoder) {
+  const Pattern small = shipped_pattern("8px-6.toml"), large = shipped_pattern("16px-5.toml");
+  const IndexedPattern indexed(small);
+  const Grey8 frame = frame_of(small, kPlane);
+  Decoder alone = decoder_of(small);
+  const Decoder of_large = decoder_of(large);
+  const Decoding expected = decode(alone, frame.view());
+  for (const Decoder* earlier : {&std::as_const(alone), &of_large}) {
+    auto created = Decoder::create(indexed, paper_rig(), 0, {}, earlier);
+    ASSERT_TRUE(created.has_value());
+    EXPECT_TRUE(same_points(decode(*created, frame.view()), expected));
+  }
 }
 
 // What lies beside an edge in depth is the first to go.

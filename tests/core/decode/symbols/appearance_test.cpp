@@ -3,6 +3,7 @@
 #include "core/decode/symbols/appearance.hpp"
 
 #include <cmath>
+#include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -70,6 +71,18 @@ TEST(Appearances, OfLargerSymbolsAreOfLargerBlurs) {
   const Appearances appearances(options(), 2 * kCameraScale);
   EXPECT_NEAR(std::log(*appearances.likeliest(many_shapes_at(kBlurPx, 2 * kCameraScale)).blur_px / kBlurPx), 0,
               std::log(1.2));
+}
+
+TEST(Appearances, AreSharedForTheSameSymbolsAtTheSameScale) {
+  const auto known = std::make_shared<const Appearances>(options(), kCameraScale);
+  PatternOptions reseeded = options(), of_others = options();
+  ++reseeded.seed;
+  of_others.symbols.back() = of_others.symbols.back() == 5 ? 7 : 5;
+  EXPECT_EQ(Appearances::shared(options(), kCameraScale, known), known);
+  EXPECT_EQ(Appearances::shared(reseeded, kCameraScale, known), known);
+  EXPECT_NE(Appearances::shared(of_others, kCameraScale, known), known);
+  EXPECT_NE(Appearances::shared(options(), 1.1F * kCameraScale, known), known);
+  EXPECT_NE(Appearances::shared(options(), kCameraScale, nullptr), nullptr);
 }
 
 TEST(Appearances, AreMadeOnce) {
