@@ -250,6 +250,71 @@ class Requests(ModelTest):
             self.assertIn(str(service.socket), message)
             self.assertNotIn("slsd-model: ", message)
 
+    def test_a_build_that_fails_leaves_the_model_before(self):
+        with Service() as service, Scanner(service) as scanner:
+            with self.web(scanner) as web:
+                before, kept = self.finished(web, scanner)
+                points = web.get("/api/model/preview")[2]
+                self.act(web, "build", box=[0, 0, 1, 1, 1, 2])  # nothing lies in it
+                failed = self.wait_state(web, "failed")
+                self.assertIn("no frame can be used", failed["error"]["message"])
+                self.assertEqual([failed[key] for key in ("report", "formats", "progress")],
+                                 [before[key] for key in ("report", "formats", "progress")])
+                self.assertGreater(failed["previews"], before["previews"])
+                self.assertEqual(self.kept(web), kept)
+                self.assertEqual(web.get("/api/model/preview")[2], points)
+                self.build_and_kill(web, "failed")
+                self.assertEqual(self.kept(web), kept)
+            with self.web(scanner) as web:  # another run of the page
+                again = self.look(web)
+                self.assertEqual((again["state"], again["report"]), ("failed", before["report"]))
+                self.assertEqual(self.kept(web), kept)
+                self.act(web, "build", voxel_mm=2)
+                told = self.wait_state(web, "done")
+                self.assertIsNone(told["error"])
+                self.assertLess(told["report"]["triangles"], before["report"]["triangles"])
+                self.assertNotEqual(self.kept(web), kept)
+                self.assertFalse((self.folder / "new").exists())
+
+    def finished(self, web, scanner):
+        self.act(web, "start")
+        scanner.let(4)
+        self.wait_placed(web, 4)
+        self.act(web, "stop")
+        scanner.let(2)
+        return self.wait_state(web, "done"), self.kept(web)
+
+    def kept(self, web):
+        answers = [web.get("/api/model/file?format=" + format_) for format_ in FORMATS]
+        self.assertEqual([answer[0] for answer in answers], [200] * len(FORMATS))
+        return [answer[2] for answer in answers]
+
+    def build_and_kill(self, web, state):
+        self.act(web, "build", close=True)
+        wait_until(lambda: self.children(web), "no program")
+        os.kill(self.children(web)[0], signal.SIGKILL)
+        self.wait_state(web, state)
+
+    def test_a_model_is_kept_while_it_is_built_again(self):
+        with Service() as service, Scanner(service) as scanner:
+            with self.web(scanner) as web:
+                before, kept = self.finished(web, scanner)
+                self.assertEqual(self.act(web, "build", close=True)["state"], "building")
+                (child,) = self.children(web)
+                os.kill(child, signal.SIGSTOP)
+                told = self.look(web)
+                self.assertEqual((told["state"], told["report"]), ("building", before["report"]))
+                self.assertEqual(self.kept(web), kept)
+                web.process.kill()
+                web.process.wait(TIMEOUT_S)
+                os.kill(child, signal.SIGCONT)
+                wait_until(lambda: has_ended(child), "it still runs")
+            with self.web(scanner) as web:
+                told = self.look(web)
+                self.assertEqual((told["state"], told["report"]), ("done", before["report"]))
+                self.assertEqual(self.kept(web), kept)
+                self.assertFalse((self.folder / "new").exists())
+
     def test_without_the_package_it_says_what_to_install(self):
         alone = self.folder.parent / "bin"
         alone.mkdir()
@@ -385,6 +450,33 @@ class Operator(ModelTest):
             browser.wait("document.getElementById('model-clear').textContent === 'End without a model?'", "it does not ask")
             browser.click("#model-clear")
             browser.wait("modelTold.state === 'none' && document.getElementById('model-shown').hidden", "it is not deleted")
+
+    def test_the_model_before_is_shown_beside_the_error_of_the_next(self):
+        with Service() as service, Scanner(service) as scanner, self.web(scanner) as web, \
+                tempfile.TemporaryDirectory() as downloads, Browser(downloads) as browser:
+            service.wait_ready()
+            self.open(browser, web)
+            self.choose(browser, "model-turned", "stopped")
+            browser.click("#model-start")
+            scanner.let(3)
+            browser.wait("modelTold.progress && modelTold.progress.placed === 3", "nothing is placed")
+            browser.click("#model-stop")
+            scanner.let(2)
+            browser.wait("modelTold.state === 'done' && modelPreview === modelTold.previews", "no model")
+            figures, drawn = self.text(browser, "model-figures"), self.drawn(browser)[0]
+            browser.run("boxChosen = [0, 0, 1, 1, 1, 2];")
+            browser.wait("!document.getElementById('model-build').disabled", "it cannot be built again")
+            browser.click("#model-build")
+            browser.wait("modelTold.state === 'failed' && modelPreview === modelTold.previews", "no failure")
+            self.assertEqual(self.text(browser, "model-state"), "The new build failed. The model before is kept.")
+            self.assertIn("no frame can be used", self.text(browser, "model-problem"))
+            self.assertEqual(self.text(browser, "model-figures"), "The model before:\n" + figures)
+            self.assertGreater(self.drawn(browser)[0], 0.9 * drawn)
+            self.picture(browser, "kept", 1280)
+            self.choose(browser, "model-format", "stl")
+            browser.click("#model-save")
+            self.assertEqual(downloaded(downloads, "model.stl")[0].read_bytes(), (self.folder / "model.stl").read_bytes())
+            self.assertEqual(browser.complaints(), [])
 
     def test_without_the_package_or_a_service_the_page_says_so(self):
         alone = self.folder.parent / "bin"

@@ -27,6 +27,9 @@ constexpr std::array<std::string_view, 5> kModelFormats{"ply", "stl", "obj", "gl
 constexpr std::size_t kMessagesMax = 100;
 constexpr std::size_t kSessionBytesMax = 1 << 20;
 
+// Files of a model that is built while another one is kept.
+constexpr const char* kNewFolder = "new";
+
 constexpr const char* kFollowing = "following";
 constexpr const char* kBuilding = "building";
 
@@ -127,7 +130,8 @@ tl::expected<client::Bytes, Refusal> map_file(const path& file) {
 
 }  // namespace
 
-ModelSession::ModelSession(path folder, path socket) : folder_(std::move(folder)), socket_(std::move(socket)) {
+ModelSession::ModelSession(path folder, path socket)
+    : folder_(std::move(folder)), socket_(std::move(socket)), made_in_(folder_) {
   const auto kept = read_file(folder_ / "session.json", kSessionBytesMax);
   const json session = kept ? json::parse(*kept, nullptr, /*allow_exceptions=*/false) : json();
   if (session.is_object() && (session.value("state", json()) == "done" || session.value("state", json()) == "failed")) {
@@ -140,6 +144,7 @@ ModelSession::ModelSession(path folder, path socket) : folder_(std::move(folder)
     state_ = "cut";
   }
   std::error_code ignored;
+  std::filesystem::remove_all(folder_ / kNewFolder, ignored);
   if (std::filesystem::exists(folder_ / "preview.ply", ignored)) previews_ = 1;
 }
 
@@ -174,7 +179,7 @@ json ModelSession::look() const {
           {"messages", messages_},
           {"report", report_},
           {"error", error_},
-          {"formats", state_ == "done" ? std::move(formats) : json::object()},
+          {"formats", report_.is_object() ? std::move(formats) : json::object()},
           {"previews", previews_},
           {"has_background", background},
           {"kept_clouds", kept_clouds()}};
@@ -237,29 +242,39 @@ std::optional<Refusal> ModelSession::check_background(const json& choices) const
 }
 
 std::optional<Refusal> ModelSession::run(std::vector<std::string> arguments, const json& choices, const char* state) {
-  if (auto made = make_folder(folder_); !made) return failed(made.error());
+  program_.reset();
+  bool keeps_model = false;
+  {
+    const std::lock_guard lock(mutex_);
+    keeps_model = report_.is_object();
+  }
+  const path into = keeps_model ? folder_ / kNewFolder : folder_;
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_ / kNewFolder, ignored);
+  if (auto made = make_folder(into); !made) return failed(made.error());
   if (has_true(choices, "use_background")) arguments.push_back("--background=" + (folder_ / "background.ply").string());
   for (const std::string_view format : kModelFormats)
-    arguments.push_back("--output=" + (folder_ / ("model." + std::string(format))).string());
-  arguments.insert(arguments.end(), {"--progress", "--preview=" + (folder_ / "preview.ply").string()});
+    arguments.push_back("--output=" + (into / ("model." + std::string(format))).string());
+  arguments.insert(arguments.end(), {"--progress", "--preview=" + (into / "preview.ply").string()});
   if (has_true(choices, "close")) arguments.emplace_back("--close");
   if (choices.contains("voxel_mm")) arguments.push_back("--voxel=" + choices["voxel_mm"].dump());
   if (choices.contains("box")) {
     arguments.emplace_back("--box");
     for (const json& each : choices["box"]) arguments.push_back(each.dump());
   }
-  program_.reset();
+  std::string state_before;
   {
     const std::lock_guard lock(mutex_);
-    state_ = state;
+    state_before = std::exchange(state_, state);
     choices_ = choices;
-    progress_ = building_ = report_ = error_ = nullptr;
+    progress_before_ = std::exchange(progress_, nullptr);
+    building_ = new_report_ = error_ = nullptr;
+    made_in_ = into;
     messages_.clear();
     asked_views_ = 0;
     abandoned_ = false;
   }
-  std::error_code ignored;
-  std::filesystem::remove(folder_ / "session.json", ignored);
+  if (!keeps_model) std::filesystem::remove(folder_ / "session.json", ignored);
   auto started = ModelProgram::start(
       arguments, [this](const json& line) { note(line); }, [this](const ModelProgram::End& end) { note_end(end); });
   if (started) {
@@ -267,7 +282,9 @@ std::optional<Refusal> ModelSession::run(std::vector<std::string> arguments, con
     return std::nullopt;
   }
   const std::lock_guard lock(mutex_);
-  state_ = kept_clouds() > 0 ? "cut" : "none";
+  made_in_ = folder_;
+  progress_ = progress_before_;
+  state_ = keeps_model ? state_before : kept_clouds() > 0 ? "cut" : "none";
   return failed(started.error());
 }
 
@@ -299,6 +316,7 @@ void ModelSession::clear() {
   const std::lock_guard lock(mutex_);
   state_ = "none";
   progress_ = building_ = report_ = error_ = nullptr;
+  made_in_ = folder_;
   messages_.clear();
   previews_ = 0;
 }
@@ -306,7 +324,7 @@ void ModelSession::clear() {
 /// Deletes clouds and files, but not the background.
 void ModelSession::forget() {
   std::error_code ignored;
-  std::filesystem::remove_all(folder_ / "recording", ignored);
+  for (const char* const name : {"recording", kNewFolder}) std::filesystem::remove_all(folder_ / name, ignored);
   for (const char* const name : {"session.json", "preview.ply"}) std::filesystem::remove(folder_ / name, ignored);
   for (const std::string_view format : kModelFormats)
     std::filesystem::remove(folder_ / ("model." + std::string(format)), ignored);
@@ -341,7 +359,7 @@ void ModelSession::note(const json& line) {
     building_ = line["building"];
   } else if (line.contains("report") && line["report"].is_object()) {
     ++previews_;
-    report_ = brief_report(line["report"]);
+    new_report_ = brief_report(line["report"]);
   } else if (line.contains("error")) {
     error_ = line["error"];
   }
@@ -350,14 +368,34 @@ void ModelSession::note(const json& line) {
 void ModelSession::note_end(const ModelProgram::End& end) {
   const std::lock_guard lock(mutex_);
   if (abandoned_) return;
-  const bool done = report_.is_object();
+  const bool done = new_report_.is_object();
   state_ = done ? "done" : "failed";
   building_ = nullptr;
   if (!done && error_.is_null()) error_ = {{"name", "error"}, {"message", reason_of(end)}};
+  if (made_in_ != folder_) end_rebuild(done);
+  if (done) report_ = new_report_;
   const json session{
       {"state", state_}, {"choices", choices_}, {"report", report_}, {"error", error_}, {"progress", progress_}};
   if (const auto kept = write_file_atomically(folder_ / "session.json", session.dump()); !kept)
     messages_.push_back("this model is not shown again when slsd-web restarts: " + to_string(kept.error()));
+}
+
+/// Puts the new model in the place of the one before, or shows the latter again.
+void ModelSession::end_rebuild(bool done) {
+  std::error_code ignored;
+  if (done) {
+    std::filesystem::remove(folder_ / "session.json", ignored);  // first: cut amid this, the files are of two models
+    std::filesystem::rename(made_in_ / "preview.ply", folder_ / "preview.ply", ignored);
+    for (const std::string_view format : kModelFormats) {
+      const std::string name = "model." + std::string(format);
+      std::filesystem::rename(made_in_ / name, folder_ / name, ignored);
+    }
+  } else {
+    progress_ = progress_before_;
+    ++previews_;
+  }
+  std::filesystem::remove_all(made_in_, ignored);
+  made_in_ = folder_;
 }
 
 std::optional<Refusal> ModelSession::keep_background(std::string_view ply) {
@@ -368,7 +406,9 @@ std::optional<Refusal> ModelSession::keep_background(std::string_view ply) {
 }
 
 tl::expected<client::Bytes, Refusal> ModelSession::preview() const {
-  return map_file(folder_ / "preview.ply");
+  const std::lock_guard lock(mutex_);
+  auto growing = map_file(made_in_ / "preview.ply");
+  return growing || made_in_ == folder_ ? std::move(growing) : map_file(folder_ / "preview.ply");
 }
 
 tl::expected<client::Bytes, Refusal> ModelSession::file(std::string_view format) const {
@@ -376,7 +416,7 @@ tl::expected<client::Bytes, Refusal> ModelSession::file(std::string_view format)
     return tl::unexpected(invalid("\"format\" must be ply, stl, obj, glb or 3mf"));
   {
     const std::lock_guard lock(mutex_);
-    if (state_ != "done") return tl::unexpected(Refusal{404, "not_found", "there is no model yet"});
+    if (!report_.is_object()) return tl::unexpected(Refusal{404, "not_found", "there is no model yet"});
   }
   return map_file(folder_ / ("model." + std::string(format)));
 }

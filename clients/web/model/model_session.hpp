@@ -29,13 +29,15 @@ namespace slsd::web {
 ///      ^                  |                                     ^          |
 ///      +-----clear--------+------(the page ends)--> cut --build-+--build---+
 ///
-/// The folder outlives the page, and with it the clouds, from which `build` makes the model again.
+/// The folder outlives the page, and with it the clouds, from which `build` makes the model again. A finished model is
+/// kept, and can be downloaded, until another one takes its place: a build that fails leaves it.
 /// @thread thread-safe
 class ModelSession {
  public:
   ModelSession(std::filesystem::path folder, std::filesystem::path socket);
 
-  /// The session: its state, progress, sentences, report or error, and what can be downloaded.
+  /// The session: its state, progress, sentences, error, and the `report` and `formats` of the finished model. In
+  /// another state than "done" these are of the model before.
   [[nodiscard]] nlohmann::json look() const;
   /// Carries out what the page asks for:
   ///
@@ -72,6 +74,7 @@ class ModelSession {
   void forget();
   void note(const nlohmann::json& line);
   void note_end(const ModelProgram::End& end);
+  void end_rebuild(bool done);
   [[nodiscard]] bool runs() const;
   [[nodiscard]] std::size_t kept_clouds() const;
 
@@ -81,7 +84,11 @@ class ModelSession {
   mutable std::mutex mutex_;  ///< guards all below but the program
   std::string state_ = "none";
   nlohmann::json choices_ = nlohmann::json::object();
-  nlohmann::json progress_, building_, report_, error_;
+  nlohmann::json progress_, building_, error_;
+  nlohmann::json report_;           ///< of the model in the folder
+  nlohmann::json new_report_;       ///< of the one that is made
+  nlohmann::json progress_before_;  ///< of the model in the folder, while one is made
+  std::filesystem::path made_in_;   ///< the folder itself, or one in it while a finished model is kept
   std::deque<std::string> messages_;
   std::uint64_t previews_ = 0;             ///< how many there were
   std::size_t asked_views_ = 0;            ///< of the turntable

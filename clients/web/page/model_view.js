@@ -50,7 +50,7 @@ function drawRing(progress) {
 // What the program says to a command line, to somebody at the page.
 const modelWords = (sentence) => sentence.replace("press Enter", "press “Next view”").replace("; Ctrl-C ends, and writes the model", "");
 
-function modelState({state, progress, building, choices, kept_clouds: kept}) {
+function modelState({state, progress, building, choices, report, kept_clouds: kept}) {
   if (state === "following") {
     const clouds = progress ? `${countOf(progress.placed, "cloud")}. ` : "";
     const view = choices.turntable && progress ? `View ${progress.placed} of ${choices.views}. ` : clouds;
@@ -62,16 +62,17 @@ function modelState({state, progress, building, choices, kept_clouds: kept}) {
     return ["", building.fused < building.of ? `Fusing cloud ${building.fused + 1} of ${building.of}…` : "Meshing, writing the files…"];
   }
   if (state === "done") return ["good", "The model is ready ✓"];
-  if (state === "failed") return ["bad", "There is no model."];
+  if (state === "failed") return ["bad", report ? "The new build failed. The model before is kept." : "There is no model."];
   if (state === "cut") return ["wait", `The last session was cut. ${countOf(kept, "cloud")} are kept: build a model of them.`];
   return ["", ""];
 }
 
-function reportInWords(report) {
-  const lines = [`${report.fused} of ${countOf(report.frames, "cloud")} fused; the object turned by ${report.turned_degrees.toFixed(0)}°.`,
-                 `${report.triangles.toLocaleString("en")} triangles, voxels of ${report.voxel_mm.toFixed(2)} mm, usual sigma ${report.sigma_mm.toFixed(3)} mm.`,
-                 report.closed ? `The end meets the beginning: ${report.drift_mm.toFixed(2)} mm apart before, ${report.seam_mm.toFixed(2)} mm after the adjustment.`
-                               : "The end does not meet the beginning: not all sides were seen."];
+function reportInWords(report, state) {
+  const lines = state === "done" ? [] : ["The model before:"];
+  lines.push(`${report.fused} of ${countOf(report.frames, "cloud")} fused; the object turned by ${report.turned_degrees.toFixed(0)}°.`,
+             `${report.triangles.toLocaleString("en")} triangles, voxels of ${report.voxel_mm.toFixed(2)} mm, usual sigma ${report.sigma_mm.toFixed(3)} mm.`,
+             report.closed ? `The end meets the beginning: ${report.drift_mm.toFixed(2)} mm apart before, ${report.seam_mm.toFixed(2)} mm after the adjustment.`
+                           : "The end does not meet the beginning: not all sides were seen.");
   if (report.invented_share > 0) lines.push(`${(100 * report.invented_share).toFixed(1)} % of the surface is invented, to close it.`);
   for (const {frame, reason} of report.refused) lines.push(`${frame} was left out: ${reason}`);
   return lines.join("\n");
@@ -119,7 +120,7 @@ function showModel(told) {
   const problem = error ? modelWords(error.message) : state === "following" && progress && progress.left_out ?
     `This cloud was left out: ${progress.left_out}` : "";
   [$("model-problem").hidden, $("model-problem").textContent] = [!problem, problem];
-  $("model-figures").textContent = report ? reportInWords(report) : "";
+  $("model-figures").textContent = report ? reportInWords(report, state) : "";
   $("model-log").hidden = messages.length === 0;
   $("model-log").lastChild.replaceChildren(...messages.slice(-kMostMessages).reverse().map((message) => element("li", modelWords(message))));
   $("model-shown").hidden = told.previews === 0;
@@ -217,7 +218,7 @@ function beginModel() {
   onClick($("model-next"), () => actOnModel("next"));
   onClick($("model-stop"), () => actOnModel("stop"));
   onClick($("model-build"), () => actOnModel("build", modelChoices()));
-  onSecondPress($("model-clear"), () => modelRuns() ? "End without a model?" : "Delete the model?", () => actOnModel("clear"));
+  onSecondPress($("model-clear"), () => modelRuns() && !modelTold.report ? "End without a model?" : "Delete the model?", () => actOnModel("clear"));
   onClick($("model-empty"), async () => {
     showModel(await (await ask("api/model/background", {})).json());
     $("model-background").checked = true;
