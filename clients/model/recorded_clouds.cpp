@@ -51,7 +51,8 @@ Result<RecordedClouds> read_recording(const std::filesystem::path& folder) {
   const auto lines = read_file(folder / "scans.jsonl", kLimitBytes);
   if (!lines) {
     if (lines.error().code != ErrorCode::kNotFound) return tl::unexpected(lines.error());
-    return fail(ErrorCode::kNotFound, "is not a recording: make one with slsctl record DIR --clouds", folder.string());
+    return fail(ErrorCode::kNotFound, "is not a recording: make one with slsctl record DIR --clouds --density pixels",
+                folder.string());
   }
   const auto calibration = read_file(folder / "calibration.yml", kLimitBytes);
   if (!calibration) return tl::unexpected(calibration.error());
@@ -60,7 +61,8 @@ Result<RecordedClouds> read_recording(const std::filesystem::path& folder) {
   recorded.calibration = std::move(*read);
   const bool whole = add_clouds(*lines, recorded);
   if (recorded.names.empty())
-    return fail(ErrorCode::kNotFound, "the recording has no clouds: make it with slsctl record DIR --clouds",
+    return fail(ErrorCode::kNotFound,
+                "the recording has no clouds: make it with slsctl record DIR --clouds --density pixels",
                 folder.string());
   const auto summary = read_file(folder / "recording.json", kLimitBytes);
   if (!whole || !summary || !ended(*summary, recorded.names.size()))

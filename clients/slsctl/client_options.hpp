@@ -30,17 +30,17 @@ struct ClientOptions {
   std::filesystem::path cloud_picture;      ///< scan: the cloud, drawn
   std::filesystem::path image;              ///< preview, frame, pattern: the PNG to write
   std::filesystem::path shown;              ///< project: a picture's name, or a file
-  std::string density;                      ///< scan, watch: "symbols" or "pixels"; empty: as configured
+  std::string density;                      ///< scan, watch, record: "symbols" or "pixels"; empty: as configured
   std::string coordinate_frame;             ///< scan: "rig" or "robot_base"; empty: as configured
   std::vector<double> robot_pose;           ///< scan: the robot's numbers; empty: none
   std::string pose_notation;                ///< scan: how the robot writes them
-  std::vector<double> box;                  ///< scan: corners of the part to measure, mm; empty: as configured
-  std::string box_frame;                    ///< scan: "rig" or "robot_base"; empty: as configured
+  std::vector<double> box;                  ///< scan, record: corners of the part to measure, mm; empty: as configured
+  std::string box_frame;                    ///< scan, record: "rig" or "robot_base"; empty: as configured
   bool set = false;                         ///< plane: subtract it from now on
   std::optional<double> margin_mm;          ///< plane: drop points up to this far before it
-  std::optional<double> voxel_mm;           ///< scan
-  std::optional<int> stride;                ///< scan
-  bool normals = false;                     ///< scan: normals of pixels
+  std::optional<double> voxel_mm;           ///< scan, record
+  std::optional<int> stride;                ///< scan, record
+  bool normals = false;                     ///< scan, record: normals of pixels
   bool mesh = false;                        ///< scan: triangles of pixels
   bool colour = false;                      ///< scan: colours from a frame in white light
   bool texture = false;                     ///< scan: intensities from a frame in white light
@@ -55,7 +55,7 @@ struct ClientOptions {
   std::optional<int> timeout_ms;
   std::vector<std::string> assignments;  ///< set: "decode.density=pixels"
   std::string action = "begin";          ///< calibrate: this, or "look", "end" or "cancel"; preset: "use" and others
-  std::string preset;                    ///< scan, preset: its name
+  std::string preset;                    ///< scan, record, preset: its name
   std::string board, ruler, code;        ///< calibrate: as for slsd --calibrate; empty: its defaults
   std::optional<int> poses;              ///< calibrate
   bool resume = false;                   ///< calibrate: continue with the last session's pictures

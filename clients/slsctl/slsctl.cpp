@@ -47,6 +47,24 @@ void add_density(CLI::App* command, ClientOptions& options) {
       ->check(one_of({"symbols", "pixels"}));
 }
 
+/// Adds the options that choose a part of the scene.
+void add_part(CLI::App* command, ClientOptions& options) {
+  command->add_option("--box", options.box, "measure within this box alone: the least and the other corner, in mm")
+      ->delimiter(',')
+      ->expected(6)
+      ->type_name("X,Y,Z,X,Y,Z");
+  command->add_option("--box-frame", options.box_frame, "the frame of the box (as configured)")
+      ->check(one_of({"rig", "robot_base"}));
+  command->add_option("--voxel-mm", options.voxel_mm, "keep one point, the most certain, of each cube of this side")
+      ->check(between(0, 1000))
+      ->type_name("MM");
+  command->add_option("--stride", options.stride, "keep the pixels of every Nth row and column")
+      ->check(between(1, 64))
+      ->type_name("N");
+  command->add_option("--preset", options.preset, "scan with the settings of this preset, which stay in force")
+      ->type_name("NAME");
+}
+
 void add_timeout(CLI::App* command, ClientOptions& options) {
   command->add_option("--timeout-ms", options.timeout_ms, "how long to wait for devices and frames (5000)")
       ->check(between(1, 600'000))
@@ -72,20 +90,7 @@ void add_scan(CLI::App& app, ClientOptions& options) {
       ->check(one_of({"ply", "pcd", "tiff", "stl", "obj", "glb"}))
       ->needs(output);
   add_density(scan, options);
-  scan->add_option("--box", options.box, "measure within this box alone: the least and the other corner, in mm")
-      ->delimiter(',')
-      ->expected(6)
-      ->type_name("X,Y,Z,X,Y,Z");
-  scan->add_option("--box-frame", options.box_frame, "the frame of the box (as configured)")
-      ->check(one_of({"rig", "robot_base"}));
-  scan->add_option("--voxel-mm", options.voxel_mm, "keep one point, the most certain, of each cube of this side")
-      ->check(between(0, 1000))
-      ->type_name("MM");
-  scan->add_option("--stride", options.stride, "keep the pixels of every Nth row and column")
-      ->check(between(1, 64))
-      ->type_name("N");
-  scan->add_option("--preset", options.preset, "scan with the settings of this preset, which stay in force")
-      ->type_name("NAME");
+  add_part(scan, options);
   scan->add_option("--coordinate-frame", options.coordinate_frame, "the frame of the points (as configured)")
       ->check(one_of({"rig", "robot_base"}));
   CLI::Option* notation =
@@ -117,13 +122,18 @@ void add_scan(CLI::App& app, ClientOptions& options) {
 void add_record(CLI::App& app, ClientOptions& options) {
   CLI::App* record = add_command(app, kMeasure, "record", "scan repeatedly, and keep the frames for replay",
                                  "  slsctl record session-1 --frames 100\n"
-                                 "  slsctl record session-2 --seconds 60 --clouds\n");
+                                 "  slsctl record session-2 --seconds 60 --clouds\n"
+                                 "  slsctl record turning --clouds --density pixels\n");
   record->add_option("DIR", options.folder, "a new or an empty folder")->required()->type_name("FOLDER");
   add_count(record, options, "--frames", "end after this many scans");
   record->add_option("--seconds", options.seconds, "end after this many seconds")
       ->check(between(0.001, 1e9))
       ->type_name("S");
-  record->add_flag("--clouds", options.clouds, "keep the clouds too");
+  CLI::Option* clouds = record->add_flag("--clouds", options.clouds, "keep the clouds too");
+  add_density(record, options);
+  add_part(record, options);
+  record->add_flag("--normals", options.normals, "the clouds also have the surface's normals (of pixels)")
+      ->needs(clouds);
   add_timeout(record, options);
 }
 

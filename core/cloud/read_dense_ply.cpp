@@ -92,9 +92,9 @@ Result<std::vector<DensePoint>> read_dense_ply(std::string_view bytes) {
   const auto layout = take_header(bytes);
   if (!layout) return fail(ErrorCode::kMalformed, "is not a cloud that slsd wrote as PLY");
   if (layout->symbols)
-    return fail(ErrorCode::kUnsupported,
-                "has a point for each symbol; one for each pixel is needed: set [decode] density = \"pixels\" in "
-                "slsd.toml, and record again");
+    return fail(
+        ErrorCode::kUnsupported,
+        "has a point for each symbol; one for each pixel is needed: scan or record again with --density pixels");
   if (!layout->rig)
     return fail(ErrorCode::kUnsupported,
                 "has its points in the robot's base; they are needed in the scanner's frame: scan with "

@@ -6,6 +6,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,6 +23,7 @@ import numpy as np  # noqa: E402
 import slsd  # noqa: E402
 from impostor import Impostor, result  # noqa: E402
 from mesh_test import mesh_ply  # noqa: E402
+from service import Service, slsctl  # noqa: E402
 
 PROGRAM = pathlib.Path(os.environ["SLSD_BIN"]) / "slsd-model"
 WIDTH, HEIGHT, FOCUS = 220, 200, 1000.0
@@ -279,6 +281,27 @@ class Model(unittest.TestCase):
                 self.assertEqual(done.returncode, 1)
                 self.assertIn(expected, done.stderr)
                 self.assertFalse((self.folder / "none.ply").exists())
+
+    def test_a_dense_recording_of_slsctl_is_all_that_it_needs(self):
+        scene = HERE.parent / "corpus/16px-5-bust"
+        configuration = (f'[pattern]\nfile = "{scene}/pattern.toml"\n[[camera]]\nname = "camera"\npath = "{scene}/frame.png"\n'
+                         f'[calibration]\nfile = "{scene}/calibration.yml"\n[scan]\ntimeout_ms = 600000\n'
+                         '[server]\nsocket = "slsd.sock"\n')
+        with tempfile.TemporaryDirectory() as folder, Service(configuration=configuration) as service:
+            service.wait_ready()
+            recording = pathlib.Path(folder) / "recording"
+            for density, status in (("symbols", 1), ("pixels", 0)):
+                recorded = slsctl("--socket", service.socket, "record", recording, "--frames", "2", "--clouds", "--density", density,
+                                  "--box=-300,-300,1700,300,300,2250")
+                self.assertEqual(recorded.returncode, 0, recorded.stderr)
+                made = subprocess.run([PROGRAM, "--from", recording, "-o", pathlib.Path(folder) / "bust.ply", "--json"],
+                                      capture_output=True, text=True, check=False)
+                self.assertEqual(made.returncode, status, made.stderr)
+                if density == "symbols":
+                    self.assertIn("scan or record again with --density pixels", made.stderr)
+                    shutil.rmtree(recording)
+            report = json.loads(made.stdout)
+            self.assertEqual((len(report["fused"]), report["refused"]), (2, []))
 
     def test_a_cut_recording_is_used_as_far_as_it_goes(self):
         cut = record(self.folder / "cut", self.clouds[:4], scans=0)

@@ -162,6 +162,47 @@ class Record(unittest.TestCase):
             cloud = client.call("scan", timeout_ms=600000)[1]
         self.assertEqual(measured((self.recording / line["cloud"]).read_bytes()), measured(cloud))
 
+    def test_replay_shows_what_was_asked_for(self):
+        """Pixels within a box, which the service would not measure by itself."""
+        service = self.enterContext(Service())
+        service.wait_ready()
+        before = slsctl("--socket", service.socket, "settings").stdout
+        result = self.record(service, "--frames", "1", "--clouds", "--density", "pixels", "--normals", "--stride", "2",
+                             "--voxel-mm", "1.5", "--box", "-100,-100,1500,100,100,2500", "--box-frame", "rig")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(slsctl("--socket", service.socket, "settings").stdout, before)
+        line, = lines_of(self.recording)
+        self.assertEqual(line["density"], "pixels")
+        self.assertGreater(line["points"], 1000)
+        about = json.loads((self.recording / "recording.json").read_text(encoding="utf-8"))["configuration"]
+        self.assertEqual(about["decode"]["density"], "pixels")
+        self.assertEqual(about["cloud"], {"box": [-100, -100, 1500, 100, 100, 2500], "box_frame": "rig", "stride": 2, "voxel_mm": 1.5})
+        with self.replay() as service, service.client() as client:
+            told, cloud = client.call("scan", timeout_ms=600000, normals=True)
+        self.assertEqual((told["density"], told["points"]), ("pixels", line["points"]))
+        recorded = (self.recording / line["cloud"]).read_bytes()
+        self.assertIn(b"property float nx\n", recorded)
+        self.assertEqual(measured(recorded), measured(cloud))
+
+    def test_a_preset_is_in_force_from_the_first_scan(self):
+        with tempfile.TemporaryDirectory(prefix="slsd-test-") as state, Service(environment={"STATE_DIRECTORY": state}) as service:
+            service.wait_ready()
+            with service.client() as client:
+                client.call("set", decode={"depth_max_mm": 600.0})
+                client.call("preset", action="save", name="near")
+                client.call("set", decode={"depth_max_mm": None})
+            result = self.record(service, "--frames", "2", "--preset", "far")
+            self.assertEqual(result.returncode, 1)
+            self.assertIn("far", result.stderr)
+            self.assertFalse(self.recording.exists())
+            result = self.record(service, "--frames", "2", "--preset", "near")
+            self.assertEqual(result.returncode, 0, result.stderr)
+            with service.client() as client:
+                self.assertEqual(client.call("status")[0]["scans"]["succeeded"], 2)
+        self.assertEqual([line["points"] for line in lines_of(self.recording)], [0, 0])
+        with self.replay() as service, service.client() as client:
+            self.assertEqual(client.call("settings")[0]["configuration"]["decode"], {"depth_max_mm": 600.0})
+
     def test_holds_everything_that_a_cloud_depends_on(self):
         self.assertEqual(self.record(self.two, "--frames", "1").returncode, 0)
         written = {str(file.relative_to(self.recording)) for file in self.recording.rglob("*") if file.is_file()}
@@ -259,7 +300,9 @@ class Record(unittest.TestCase):
         self.assertIn("Permission denied", result.stderr)
 
     def test_usage(self):
-        for usage in (["record"], ["record", "x", "--frames", "0"], ["record", "x", "--seconds", "-1"], ["record", "-"]):
+        for usage in (["record"], ["record", "x", "--frames", "0"], ["record", "x", "--seconds", "-1"], ["record", "-"],
+                      ["record", "x", "--density", "lines"], ["record", "x", "--box", "1,2,3"], ["record", "x", "--stride", "0"],
+                      ["record", "x", "--normals"], ["record", "x", "--clouds", "--normals", "--density", "symbols"]):
             self.assertEqual(slsctl(*usage).returncode, 2)
         self.assertEqual(slsctl("--socket", self.folder / "none", "record", self.recording).returncode, 3)
         self.assertFalse(self.recording.exists())

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "clients/connection/passing.hpp"
+#include "clients/slsctl/asked_part.hpp"
 #include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/recording.hpp"
 #include "clients/slsctl/report.hpp"
@@ -20,10 +21,29 @@ namespace {
 
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
+using Scanned = tl::expected<Answered, Failure>;
 using namespace std::chrono_literals;
 
 // Longer than a camera needs to return after it was unplugged, but short enough not to waste a night.
 constexpr auto kTimeout = 60s;
+
+json scan_parameters(const ClientOptions& options) {
+  json params{{"format", "ply"}, {"frames", "raw"}, {"coordinate_frame", "rig"}};  // as its replay
+  params.update(asked_part(options));
+  if (!options.density.empty()) params["density"] = options.density;
+  if (options.normals) params["density"] = "pixels", params["normals"] = true;
+  if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
+  return params;
+}
+
+/// The settings with which a replay gives the clouds that the scans ask for.
+json replayed_settings(json settings, const ClientOptions& options) {
+  const json params = scan_parameters(options), part = asked_part(options);
+  json& configuration = settings["configuration"];
+  if (params.contains("density")) configuration["decode"]["density"] = params["density"];
+  if (!part.empty()) configuration["cloud"].update(part);
+  return settings;
+}
 
 class Recorder {
  public:
@@ -35,18 +55,21 @@ class Recorder {
         settings_(std::move(settings)) {}
 
   /// Runs the recording. Returns the first error that ended it early.
-  [[nodiscard]] std::optional<Failure> run() {
-    std::optional<Failure> failed = ask_for_scan();
-    while (!failed) {
+  /// @param first  a scan that was made already
+  [[nodiscard]] std::optional<Failure> run(const std::optional<Scanned>& first) {
+    std::optional<Failure> failed;
+    bool ends = false;
+    if (first) failed = keep(*first), ends = enough(0);
+    if (!failed && !ends) failed = ask_for_scan();
+    while (!failed && !ends) {
       auto reply = connection_.reply();
       if (!reply) failed = failure(reply.error());
       if (failed) break;
-      const auto answered = judge(std::move(reply));
-      const bool ends = enough(answered ? 1 : 0);
+      const Scanned answered = judge(std::move(reply));
+      ends = enough(answered ? 1 : 0);
       if (!ends) failed = ask_for_scan();
       if (auto kept = keep(answered)) failed = kept;
       show_progress();
-      if (ends) break;
     }
     if (!failed) failed = check_settings();
     if (auto finished = recording_.finish(); !finished && !failed) failed = file_failure(finished.error());
@@ -75,13 +98,11 @@ class Recorder {
   [[nodiscard]] static Failure file_failure(const Error& error) { return {kRequestFailed, rpc_error(error)}; }
 
   [[nodiscard]] std::optional<Failure> ask_for_scan() {
-    json params{{"format", "ply"}, {"frames", "raw"}, {"coordinate_frame", "rig"}};  // as its replay
-    if (options_.timeout_ms) params["timeout_ms"] = *options_.timeout_ms;
-    if (auto sent = connection_.request("scan", params); !sent) return failure(sent.error());
+    if (auto sent = connection_.request("scan", scan_parameters(options_)); !sent) return failure(sent.error());
     return std::nullopt;
   }
 
-  [[nodiscard]] std::optional<Failure> keep(const tl::expected<Answered, Failure>& answered) {
+  [[nodiscard]] std::optional<Failure> keep(const Scanned& answered) {
     if (!answered) return keep_failure(answered.error());
     last_good_ = Clock::now();
     if (auto kept = recording_.add(*answered); !kept) return file_failure(kept.error());
@@ -136,14 +157,21 @@ std::string summary_line(const json& summary) {
 int record_command(const ClientOptions& options) {
   auto connection = Connection::open(options.socket);
   if (!connection) return report(options, failure(connection.error()));
+  std::optional<Scanned> first;
+  if (!options.preset.empty()) {  // a scan puts it into force; the settings are then the preset's
+    json params = scan_parameters(options);
+    params["preset"] = options.preset;
+    first = ask(*connection, "scan", params);
+    if (!*first) return report(options, first->error());
+  }
   auto settings = ask(*connection, "settings", json::object());
   if (!settings) return report(options, settings.error());
   json& told = settings->reply.message["result"];
-  auto recording = Recording::create(options.folder, told, options.clouds);
+  auto recording = Recording::create(options.folder, replayed_settings(told, options), options.clouds);
   if (!recording) return report(options, {kRequestFailed, rpc_error(recording.error())});
   Interrupt::watch();
   Recorder recorder(options, std::move(*connection), std::move(*recording), std::move(told));
-  const auto failed = recorder.run();
+  const auto failed = recorder.run(first);
   if (failed) return report(options, *failed);
   const json summary = recorder.summary();
   std::cout << (options.json ? to_line(summary) : summary_line(summary));

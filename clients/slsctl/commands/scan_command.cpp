@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #include <ostream>
 
+#include "clients/slsctl/asked_part.hpp"
 #include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/progress.hpp"
@@ -128,10 +129,7 @@ json scan_parameters(const ClientOptions& options, const std::string& density) {
   if (options.why) params["why"] = true;
   if (!density.empty()) params["density"] = density;
   if (!options.camera.empty()) params["camera"] = options.camera;
-  if (!options.box.empty()) params["box"] = options.box;
-  if (!options.box_frame.empty()) params["box_frame"] = options.box_frame;
-  if (options.voxel_mm) params["voxel_mm"] = *options.voxel_mm;
-  if (options.stride) params["stride"] = *options.stride;
+  params.update(asked_part(options));
   if (!options.preset.empty()) params["preset"] = options.preset;
   if (!options.coordinate_frame.empty()) params["coordinate_frame"] = options.coordinate_frame;
   if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose, params["poses"] = options.pose_notation;
