@@ -61,11 +61,12 @@ template <class Look>
     for (std::size_t rung = PatternFields::kUsualRung + 2; rung < PatternFields::kLadderPx.size(); rung += 2)
       if (const BlurSeen other = look(fields.rung(rung)); other.aligned > seen.aligned) seen = other;
   }
-  std::shared_ptr<const PatternField> field = fields.at(seen.blur_px);
+  std::shared_ptr<const PatternField> field = fields.at(seen.blur_px), before;
   for (int round = 0; round < kRoundsMost; ++round) {
     auto next = fields.at(look(*field).blur_px);
-    if (next == field) break;
-    field = std::move(next);
+    // Between two fields, a blur may ask for each of them in turn.
+    if (next == field || next == before) break;
+    before = std::exchange(field, std::move(next));
   }
   return field;
 }

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include <Eigen/LU>
 
@@ -157,10 +158,11 @@ DenseFrame DenseMapper::develop(const DenseFrame& frame) {
 /// @return the light of the frame
 DenseFrame DenseMapper::find_pattern(const DenseFrame& frame) {
   DenseFrame light = frame;
+  bool again = false;
   field_ = find_field_and_tone(
       *fixed_->fields, tone_, [&] { light = develop(frame); },
       [&](const PatternField& field) {
-        grid_.find_epipolar_offset(light, field, seeds_);
+        grid_.find_epipolar_offset(light, field, seeds_, std::exchange(again, true));
         return grid_.look_at_blur(light, field, seeds_);
       });
   return light;

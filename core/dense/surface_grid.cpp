@@ -172,17 +172,17 @@ BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const PatternField& 
 }
 
 void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternField& field,
-                                       std::span<const SurfaceSeed> seeds) {
+                                       std::span<const SurfaceSeed> seeds, bool again) {
   const Lens& lens = geometry_->camera.lens;
   if (batches_.empty()) batches_.resize(1);
   Batch& batch = batches_[0];
-  epipolar_ = {};
-  epipolar_.middle_px = 0.5F * Eigen::Vector2f(static_cast<float>(lens.width_px), static_cast<float>(lens.height_px));
-  const EpipolarOffset none = epipolar_;
+  EpipolarOffset none;
+  none.middle_px = 0.5F * Eigen::Vector2f(static_cast<float>(lens.width_px), static_cast<float>(lens.height_px));
+  if (!again) epipolar_ = none;
   const std::size_t step = std::max<std::size_t>(1, seeds.size() / kOffsetSeeds);
   // The aligner's prior holds the pattern near its line; a second round, from the first one's result, removes that
   // bias.
-  for (int round = 0; round < 2; ++round) {
+  for (int round = again ? 1 : 0; round < 2; ++round) {
     offsets_.clear();
     for (std::size_t first = step / 2; first < seeds.size(); first += step * kBatchNodes) {
       const std::size_t count = align_some(frame, field, seeds, first, step, batch);

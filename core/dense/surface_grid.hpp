@@ -123,7 +123,9 @@ class SurfaceGrid {
                                       std::span<const SurfaceSeed> seeds);
 
   /// Measures at some seeds how far the pattern lies off its epipolar lines; later alignments start there.
-  void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds);
+  /// @param again  starts from the present offset, which was measured in this frame, so that one round is enough
+  void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+                            bool again = false);
   [[nodiscard]] const EpipolarOffset& epipolar_offset() const { return epipolar_; }
   void set_epipolar_offset(const EpipolarOffset& offset) { epipolar_ = offset; }
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use

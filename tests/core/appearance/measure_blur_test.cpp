@@ -161,6 +161,17 @@ TEST(FindField, StartsWiderIfMostPatchesFail) {
   EXPECT_NEAR(find_field(fields, std::ref(looks))->blur_sigma_px(), 2.4F, 0.06F);
 }
 
+TEST(FindField, EndsIfTwoFieldsAskForEachOther) {
+  const PatternFields fields(shown_pattern());
+  std::vector<float> at;
+  const auto field = find_field(fields, [&](const PatternField& tried) {
+    at.push_back(tried.blur_sigma_px());
+    return BlurSeen{.aligned = 10, .tried = 10, .blur_px = tried.blur_sigma_px() < 0.805F ? 0.81F : 0.8F};
+  });
+  EXPECT_NEAR(field->blur_sigma_px(), 0.805F, 0.01F);
+  EXPECT_LE(at.size(), 4U);
+}
+
 TEST(FindField, EndsWithoutPatches) {
   const PatternFields fields(shown_pattern());
   int looks = 0;
