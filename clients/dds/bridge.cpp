@@ -219,6 +219,7 @@ class Running : public Bridge {
     try {
       client::ScanOptions options;
       options.density = options_.density;
+      options.colour = options_.colour;
       if (on_arm_) options.coordinate_frame = "rig";  // the robot's pose is known after the exposure, or never
       const client::Cloud cloud = client::Scanner(options_.socket).scan(options);
       if (const auto published = publish(cloud); !published) return {false, published.error().message};

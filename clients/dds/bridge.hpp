@@ -17,6 +17,7 @@ struct BridgeOptions {
   std::string socket;                    ///< the service's socket; empty: the usual place
   std::optional<double> rate_hz;         ///< of clouds; 0: only triggered ones; nothing: every frame
   std::string density;                   ///< "symbols" or "pixels"; empty: as configured
+  bool colour = false;                   ///< triggered scans have the surface's colours
   Thinning thinning;                     ///< reduces clouds and depth images
   double image_rate_hz = 0;              ///< of images from every camera; 0: none
   bool transforms = true;                ///< false: the robot's own description contains the scanner's frames

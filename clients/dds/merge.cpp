@@ -266,9 +266,8 @@ class Running : public Merge {
     }
     PointCloud2 message;
     message.header = {oldest, sources_.front().extrinsics.parent};
-    message.point_fields = point_fields(true);
     point_count_ = merged.size() / kPointStep;
-    set_points(message, std::move(merged));
+    set_points(message, PointKind::kMerged, std::move(merged));
     const bool written = points_.write(message);
     if (written) ++published_;
     if (!written && !std::exchange(overtaken_, true)) say(kOvertaken);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <unordered_set>
 #include <utility>
 
@@ -50,6 +51,25 @@ bool on_stride(const client::Point& point, const std::vector<CalibratedCamera>& 
   return pixel.u % stride == 0 && pixel.v % stride == 0;
 }
 
+std::uint32_t step_of(PointKind kind) {
+  return kind == PointKind::kColoured ? kColouredPointStep : kPointStep;
+}
+
+/// The colours of a cloud's points, packed as in the field `rgb`.
+class Colours {
+ public:
+  explicit Colours(const client::Cloud& cloud)
+      : red_(cloud.column<std::uint8_t>("red")),
+        green_(cloud.column<std::uint8_t>("green")),
+        blue_(cloud.column<std::uint8_t>("blue")) {}
+  [[nodiscard]] std::uint32_t packed(std::size_t i) const {
+    return std::uint32_t{red_[i]} << 16U | std::uint32_t{green_[i]} << 8U | blue_[i];
+  }
+
+ private:
+  client::Column<std::uint8_t> red_, green_, blue_;
+};
+
 ros::Time stamp(std::chrono::system_clock::time_point time) {
   const auto seconds = std::chrono::floor<std::chrono::seconds>(time);
   return {static_cast<std::int32_t>(seconds.time_since_epoch().count()),
@@ -58,19 +78,21 @@ ros::Time stamp(std::chrono::system_clock::time_point time) {
 
 }  // namespace
 
-std::vector<ros::PointField> point_fields(bool merged) {
+std::vector<ros::PointField> point_fields(PointKind kind) {
   using Kind = ros::PointField;
   std::vector<ros::PointField> fields{{"x", 0, Kind::kFloat32},          {"y", 4, Kind::kFloat32},
                                       {"z", 8, Kind::kFloat32},          {"sigma", 12, Kind::kFloat32},
                                       {"intensity", 16, Kind::kFloat32}, {"camera", 20, Kind::kUint8}};
-  if (merged) fields.push_back({"scanner", 21, Kind::kUint8});
+  if (kind == PointKind::kMerged) fields.push_back({"scanner", 21, Kind::kUint8});
+  if (kind == PointKind::kColoured) fields.push_back({"rgb", 24, Kind::kFloat32});
   return fields;
 }
 
-void set_points(ros::PointCloud2& message, std::vector<std::uint8_t> data) {
+void set_points(ros::PointCloud2& message, PointKind kind, std::vector<std::uint8_t> data) {
+  message.point_fields = point_fields(kind);
   message.height = 1;
-  message.width = static_cast<std::uint32_t>(data.size() / kPointStep);
-  message.point_step = kPointStep;
+  message.point_step = step_of(kind);
+  message.width = static_cast<std::uint32_t>(data.size() / message.point_step);
   message.row_step = static_cast<std::uint32_t>(data.size());
   message.data = std::move(data);
   message.is_dense = true;
@@ -94,9 +116,12 @@ ros::PointCloud2 point_cloud(const client::Cloud& cloud, const ros::Header& head
   if (thinning.voxel_mm > 0) voxels.emplace(thinning.voxel_mm);
   const bool moves = !frame_from_cloud.rotation.isIdentity(0) ||
                      !frame_from_cloud.translation.isZero(0);  // else bits stay as they are
-  std::vector<std::uint8_t> data(kPointStep * cloud.size());
+  const auto colours = cloud.has("red") ? std::optional<Colours>(cloud) : std::nullopt;
+  const PointKind kind = colours ? PointKind::kColoured : PointKind::kPlain;
+  std::vector<std::uint8_t> data(step_of(kind) * cloud.size());
   std::uint8_t* to = data.data();
-  for (const client::Point point : cloud) {
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const client::Point point = cloud[i];
     if (!on_stride(point, cameras, stride) || (voxels && !voxels->take(point))) continue;
     Eigen::Vector3f at(point.x, point.y, point.z);
     if (moves) at = (frame_from_cloud * at.cast<double>()).cast<float>();
@@ -104,13 +129,16 @@ ros::PointCloud2 point_cloud(const client::Cloud& cloud, const ros::Header& head
                             static_cast<float>(point.intensity)};
     std::memcpy(to, values, sizeof values);
     to[20] = point.camera;
-    to += kPointStep;
+    if (colours) {
+      const std::uint32_t packed = colours->packed(i);
+      std::memcpy(to + kPointStep, &packed, sizeof packed);
+    }
+    to += step_of(kind);
   }
   data.resize(static_cast<std::size_t>(to - data.data()));
   ros::PointCloud2 message;
   message.header = header;
-  message.point_fields = point_fields(false);
-  set_points(message, std::move(data));
+  set_points(message, kind, std::move(data));
   return message;
 }
 

@@ -24,10 +24,13 @@ inline constexpr const char* kCalibrationDate = "calibration date";
 
 /// The bytes of one point: x y z sigma intensity (float32), camera scanner (uint8), two of padding.
 inline constexpr std::uint32_t kPointStep = 24;
-/// The fields of a point; only merged clouds have `scanner`.
-[[nodiscard]] std::vector<ros::PointField> point_fields(bool merged);
-/// Sets everything except the header and the fields: points in one array, unorganised.
-void set_points(ros::PointCloud2& message, std::vector<std::uint8_t> data);
+/// With colour: the same and `rgb`, the number 0xRRGGBB in the bits of a float32, as PCL and RViz read it.
+inline constexpr std::uint32_t kColouredPointStep = 28;
+/// The fields of a point; only merged clouds have `scanner`, only coloured ones `rgb`.
+enum class PointKind { kPlain, kMerged, kColoured };
+[[nodiscard]] std::vector<ros::PointField> point_fields(PointKind kind);
+/// Sets everything except the header: points of this kind in one array, unorganised.
+void set_points(ros::PointCloud2& message, PointKind kind, std::vector<std::uint8_t> data);
 
 /// Selects the points of a cloud for publication.
 struct Thinning {
@@ -37,6 +40,7 @@ struct Thinning {
 
 /// Converts a cloud to metres. The axes of slsd's rig frame equal those of ROS's optical frames: x right, y down, z
 /// forward.
+/// A cloud with red, green and blue becomes one of kColoured.
 /// @param cameras  of the calibration, in the frame of the cloud; a stride requires them
 /// @param frame_from_cloud  moves the points into another frame
 /// @thread reentrant

@@ -62,6 +62,8 @@ void add_scanner_options(CLI::App& app, slsd::dds::BridgeOptions& options) {
       ->check(slsd::between(1, 16));
   app.add_option("--voxel", options.thinning.voxel_mm, "keep one point per cube of this size in mm; 0: keep all (0)")
       ->check(slsd::between(0.0, 1000.0));
+  app.add_flag("--colour", options.colour,
+               "give triggered scans the surface's colours, from a second frame in white light");
   app.add_option("--image-rate", options.image_rate_hz, "images per second, 1 or more; 0: none (0)")
       ->check(slsd::between(0.0, 100.0));
   app.add_option("--extrinsics", options.extrinsics, "the TOML file with the poses of the scanners");
@@ -77,16 +79,15 @@ void add_robot_options(CLI::App& app, slsd::dds::RobotFrames& robot, bool& print
              "--flange", robot.flange,
              "the frame in tf of the flange that carries the scanner, such as tool0: puts clouds into --robot-base")
           ->type_name("FRAME");
-  auto* prints =
-      app.add_flag("--print-pose", prints_pose,
-                   "print the pose of --flange in --robot-base as ROS has it, once it stands still, and exit")
-          ->needs(flange);
+  app.add_flag("--print-pose", prints_pose,
+               "print the pose of --flange in --robot-base as ROS has it, once it stands still, and exit")
+      ->needs(flange);
 }
 
 void add_merge_options(CLI::App& app, bool& merges, slsd::dds::MergeOptions& merge) {
   auto* merging = app.add_flag("--merge", merges, "publish one cloud of several scanners, placed by --extrinsics");
-  for (const char* alone : {"--socket", "--rate", "--density", "--stride", "--voxel", "--image-rate", "--no-transforms",
-                            "--describe", "--print-pose", "--flange"})
+  for (const char* alone : {"--socket", "--rate", "--density", "--colour", "--stride", "--voxel", "--image-rate",
+                            "--no-transforms", "--describe", "--print-pose", "--flange"})
     merging->excludes(app.get_option(alone));
   app.add_option("--scanner", merge.scanners, "with --merge: a scanner to merge; may be repeated (all in the file)")
       ->needs(merging);

@@ -9,6 +9,7 @@ same once more.
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,7 @@ sys.path[:0] = [str(HERE.parents[1] / "clients/python"), str(HERE.parent / "daem
 
 import numpy as np  # noqa: E402
 
+import colour_test  # noqa: E402
 import robot_frame_test  # noqa: E402
 import slsd  # noqa: E402
 from dds_bridge import DOMAIN, FIELDS, RECORD, Bridge, Listener, States, matrix, probe, transforms, turn  # noqa: E402
@@ -192,6 +194,52 @@ class Thinned(unittest.TestCase):
             wait_until(lambda: int(states.samples.get("left: slsd", {"values": {"clouds lost before publishing": "0"}})["values"]
                                    ["clouds lost before publishing"]) > 2, "that clouds are lost")
             self.assertEqual(bridge.said().count("clouds exceed the rate limit"), 1)
+
+
+class Coloured(unittest.TestCase):
+    def triggered(self, camera_path, *options):
+        """What the trigger answers, and the cloud that came of it, beside the same scan of the socket."""
+        with Service(camera_path=camera_path) as service, slsd.Scanner(service.socket) as scanner, \
+                Bridge(service, "--rate", "0", "--colour", *options), Listener("left/points", "PointCloud2") as clouds:
+            done = subprocess.run([BIN / "dds_probe", "--domain", str(DOMAIN), "--call", "left"], capture_output=True,
+                                  text=True, timeout=120, check=True)
+            if " points, scan " not in done.stdout:
+                return done.stdout, None, None
+            wait_until(lambda: clouds.count > 0, "a cloud")
+            density = "pixels" if "pixels" in options else "symbols"
+            return done.stdout, clouds.samples[""].point_cloud(), \
+                scanner.scan(colour=True, density=density, timeout_s=60).points
+
+    def frames(self, **pictures):
+        folder = tempfile.TemporaryDirectory(prefix="slsd-test-")
+        self.addCleanup(folder.cleanup)
+        shutil.copy(SCENE / "frame.png", folder.name)
+        for name, picture in pictures.items():
+            (pathlib.Path(folder.name) / name).mkdir()
+            (pathlib.Path(folder.name) / name / "0.ppm").write_bytes(b"P6 1600 1200 255\n" + picture.tobytes())
+        return folder.name
+
+    def test_triggered_scans_are_those_of_the_socket(self):
+        white = colour_test.gradient(1600, 1200)
+        for options in ((), ("--density", "pixels", "--stride", "1")):
+            _, message, expected = self.triggered(self.frames(white=white), *options)
+            self.assertEqual([tuple(field) for field in message["fields"]], [*FIELDS, ("rgb", 24, 7, 1)])
+            self.assertEqual([message["width"], message["point_step"], message["row_step"]],
+                             [len(expected), 28, 28 * len(expected)])
+            points = np.frombuffer(message["data"], np.dtype([*RECORD.descr, ("rgb", "<u4")]))
+            np.testing.assert_array_equal(points["x"], expected["x"] / np.float32(1000))
+            np.testing.assert_array_equal(
+                points["rgb"], expected["red"].astype("u4") << 16 | expected["green"].astype("u4") << 8 | expected["blue"])
+            self.assertGreater(len(np.unique(points["rgb"])), 1000)
+
+    def test_a_camera_without_colours_is_answered_by_name(self):
+        white = np.full((1200, 1600), 200, np.uint8)
+        folder = self.frames()
+        (pathlib.Path(folder) / "white").mkdir()
+        (pathlib.Path(folder) / "white" / "0.pgm").write_bytes(b"P5 1600 1200 255\n" + white.tobytes())
+        answer, message, _ = self.triggered(folder)
+        self.assertIsNone(message)
+        self.assertIn(" 0 unsupported: ", answer)
 
 
 class InTheRobotsBase(unittest.TestCase):
