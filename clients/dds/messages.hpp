@@ -24,7 +24,7 @@ inline constexpr const char* kCalibrationDate = "calibration date";
 
 /// The bytes of one point: x y z sigma intensity (float32), camera scanner (uint8), two of padding.
 inline constexpr std::uint32_t kPointStep = 24;
-/// With colour: the same and `rgb`, the number 0xRRGGBB in the bits of a float32, as PCL and RViz read it.
+/// The same of a coloured point, and `rgb`: the number 0xRRGGBB in the bits of a float32, as PCL and RViz read it.
 inline constexpr std::uint32_t kColouredPointStep = 28;
 /// The fields of a point; only merged clouds have `scanner`, only coloured ones `rgb`.
 enum class PointKind { kPlain, kMerged, kColoured };
