@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <iterator>
 #include <list>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <thread>
 #include <utility>
@@ -67,9 +70,13 @@ std::optional<RigidTransform> transform_of(const json& told, const char* key) {
   return transform;
 }
 
-std::string time_of_exposure(const json& told) {
-  return told.is_object() && told.contains("time") && told["time"].is_string() ? told["time"].get<std::string>()
-                                                                               : std::string();
+/// Reads from its description when a cloud was exposed. A service without `time_ns` tells milliseconds.
+std::optional<std::chrono::system_clock::time_point> time_of_exposure(const json& told) {
+  if (!told.is_object()) return std::nullopt;
+  if (const auto exact = told.find("time_ns"); exact != told.end() && exact->is_number_integer())
+    return std::chrono::sys_time<std::chrono::nanoseconds>(std::chrono::nanoseconds(exact->get<std::int64_t>()));
+  const auto text = told.find("time");
+  return text != told.end() && text->is_string() ? time_from_utc(text->get<std::string>()) : std::nullopt;
 }
 
 // "tf_late" of "tf_late: ..."
@@ -151,7 +158,8 @@ class Running : public Bridge {
   // @errors of base_from_rig()
   Result<> publish(const client::Cloud& cloud) {
     const json told = json::parse(cloud.description, nullptr, false);
-    const auto stamp = stamp_of(time_of_exposure(told));
+    const auto exposed = time_of_exposure(told);
+    const auto stamp = exposed ? stamp_of(*exposed) : stamp_now();
     const auto in_base = transform_of(told, "base_from_rig");  // the service has placed the points
     const auto moved = in_base || !poses_ ? RigidTransform() : base_from_rig(told);
     const std::lock_guard lock(mutex_);
@@ -199,7 +207,7 @@ class Running : public Bridge {
           "hand_eye_missing: the service has no hand-eye calibration for the scanner on the arm, or an old one: "
           "run slsctl hand-eye --mounted arm, set [frame] hand_eye, and run systemctl reload slsd");
     }
-    const auto time = time_from_utc(time_of_exposure(told));
+    const auto time = time_of_exposure(told);
     if (!time) return fail(ErrorCode::kMalformed, "time_missing: the cloud does not say when it was exposed");
     auto base_from_flange = poses_->at(*time);
     if (!base_from_flange) return base_from_flange;

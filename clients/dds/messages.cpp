@@ -3,7 +3,6 @@
 #include "messages.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -12,8 +11,6 @@
 #include <utility>
 
 #include <Eigen/Geometry>
-
-#include "core/utc_text.hpp"
 
 namespace slsd::dds {
 namespace {
@@ -70,12 +67,6 @@ class Colours {
   client::Column<std::uint8_t> red_, green_, blue_;
 };
 
-ros::Time stamp(std::chrono::system_clock::time_point time) {
-  const auto seconds = std::chrono::floor<std::chrono::seconds>(time);
-  return {static_cast<std::int32_t>(seconds.time_since_epoch().count()),
-          static_cast<std::uint32_t>(std::chrono::nanoseconds(time - seconds).count())};
-}
-
 }  // namespace
 
 std::vector<ros::PointField> point_fields(PointKind kind) {
@@ -99,12 +90,13 @@ void set_points(ros::PointCloud2& message, PointKind kind, std::vector<std::uint
 }
 
 ros::Time stamp_now() {
-  return stamp(std::chrono::system_clock::now());
+  return stamp_of(std::chrono::system_clock::now());
 }
 
-ros::Time stamp_of(std::string_view utc) {
-  const auto time = time_from_utc(utc);
-  return time ? stamp(*time) : stamp_now();
+ros::Time stamp_of(std::chrono::system_clock::time_point time) {
+  const auto seconds = std::chrono::floor<std::chrono::seconds>(time);
+  return {static_cast<std::int32_t>(seconds.time_since_epoch().count()),
+          static_cast<std::uint32_t>(std::chrono::nanoseconds(time - seconds).count())};
 }
 
 ros::PointCloud2 point_cloud(const client::Cloud& cloud, const ros::Header& header,

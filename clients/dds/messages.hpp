@@ -2,9 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include <slsd/cloud.hpp>
@@ -18,8 +18,7 @@ namespace slsd::dds {
 /// The key of the calibration date in a scanner's diagnostics.
 inline constexpr const char* kCalibrationDate = "calibration date";
 
-/// Parses the time in a description ("2026-01-31T12:00:00.250Z"); now if it has none. @thread reentrant
-[[nodiscard]] ros::Time stamp_of(std::string_view utc);
+[[nodiscard]] ros::Time stamp_of(std::chrono::system_clock::time_point time);
 [[nodiscard]] ros::Time stamp_now();
 
 /// The bytes of one point: x y z sigma intensity (float32), camera scanner (uint8), two of padding.

@@ -41,6 +41,7 @@ class TimeZone(unittest.TestCase):
         call = lambda *words: slsctl("--socket", service.socket, "--json", *words, env=environment)  # noqa: E731
         told = json.loads(call("scan", "-o", self.folder / "cloud.ply").stdout)
         self.assert_now(read(told["time"]), "the reply of a scan")
+        self.assertEqual(round(1000 * read(told["time"]).timestamp()), told["time_ns"] // 1_000_000)
         header = (self.folder / "cloud.ply").read_bytes().split(b"end_header")[0].decode()
         self.assertIn(f"comment time {told['time']}", header)
         call("scan", "-o", self.folder / "cloud.pcd")

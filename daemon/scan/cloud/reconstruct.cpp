@@ -21,8 +21,8 @@ namespace {
 
 using std::chrono::steady_clock;
 
-std::string utc_time(MonotonicTime time) {
-  return utc_text_ms(std::chrono::system_clock::now() - (steady_clock::now() - time));
+std::chrono::system_clock::time_point utc_time(MonotonicTime time) {
+  return std::chrono::system_clock::now() - (steady_clock::now() - time);
 }
 
 void append(const Decoding& decoding, std::uint8_t camera, ScanResult& result) {
@@ -44,7 +44,8 @@ ScanResult describe(const FrameSet& set, const ScanSetup& setup, const std::stri
   result.cloud.lattice_rows = setup.pattern.whole_rows();
   result.cloud.cameras = static_cast<int>(setup.calibration->cameras.size());
   result.cloud.scan_id = scan_id;
-  result.cloud.time = utc_time(set.frames.front().exposure_start());
+  result.exposed = utc_time(set.frames.front().exposure_start());
+  result.cloud.time = utc_text_ms(result.exposed);
   result.cloud.frame = set.frames.front().sequence();
   return result;
 }

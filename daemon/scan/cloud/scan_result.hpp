@@ -132,6 +132,7 @@ struct ScanResult {
   std::vector<RegionReason> reasons = {};             ///< one for each region that gave no point, of all cameras
   std::optional<std::uint64_t> saturated;             ///< if requested: points that white was too bright for
   std::optional<std::uint64_t> dense_saturated = {};  ///< the same for the points of pixels
+  std::chrono::system_clock::time_point exposed{};    ///< when the exposure began, as `cloud.time`
   MonotonicTime received;                             ///< time when the last byte of the frames arrived
   std::chrono::nanoseconds skew{};                    ///< time between the first and the last camera's exposure
   std::uint64_t skipped = 0;  ///< sets of frames since the previous scan that were skipped for newer ones

@@ -86,6 +86,7 @@ json scan_json(const ScanResult& scan, Density density) {
   for (std::size_t i = 0; i < scan.stage_times.size(); ++i) stages[stage_name(i)] = milliseconds(scan.stage_times[i]);
   json result{{"scan", scan.cloud.scan_id},
               {"time", scan.cloud.time},
+              {"time_ns", std::chrono::nanoseconds(scan.exposed.time_since_epoch()).count()},
               {"frame", scan.cloud.frame},
               {"points", scan.cloud.points.size()},
               {"regions", regions_json(scan.regions)},

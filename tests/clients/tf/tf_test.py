@@ -191,6 +191,7 @@ class Clouds(unittest.TestCase):
             rig = scanner.scan(coordinate_frame="rig").points
         self.assertEqual(len(samples), 5)
         places = np.stack([rig[axis].astype(float) for axis in "xyz"], axis=1)
+        beyond_ms = []
         for sample in samples:
             cloud = sample.point_cloud()
             self.assertEqual(cloud["header"]["frame_id"], "base_link")
@@ -198,9 +199,11 @@ class Clouds(unittest.TestCase):
             np.testing.assert_array_equal(points["sigma"], rig["sigma_mm"] / np.float32(1000))
             got = np.stack([points[axis] for axis in "xyz"], axis=1)
             stamp_ns = round(1e9 * cloud["header"]["stamp"])
+            beyond_ms.append(stamp_ns % 1_000_000)
             off = lambda at_ns: np.abs(got - self.expected(robot, at_ns, places)).max()  # noqa: E731
             self.assertLess(off(stamp_ns), 2e-5)  # stamps in this test lose a few hundred ns
             self.assertGreater(off(stamp_ns - 30_000_000), 2e-4)
+        self.assertTrue(any(1000 < rest < 999_000 for rest in beyond_ms), beyond_ms)  # no whole milliseconds
 
     def expected(self, robot, stamp_ns, places):
         whole = np.linalg.inv(matrix(BASE)) @ robot.pose_at(stamp_ns) @ matrix(TOOL) @ robot_frame_test.MOUNT
