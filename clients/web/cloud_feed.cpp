@@ -18,8 +18,7 @@ constexpr auto kPause = 500ms;     // after a failure
 
 }  // namespace
 
-CloudFeed::CloudFeed(std::filesystem::path socket, std::string density, double rate_hz)
-    : socket_(std::move(socket)), density_(std::move(density)), rate_hz_(rate_hz) {
+CloudFeed::CloudFeed(std::filesystem::path socket, Kind kind) : socket_(std::move(socket)), kind_(std::move(kind)) {
   thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
 }
 
@@ -61,10 +60,10 @@ std::optional<Failure> CloudFeed::follow(const std::stop_token& stop) {
   if (!connection) return failure(connection.error());
   connection->set_timeout(kTimeout);
   const auto subscribed = ask(*connection, "subscribe",
-                              {{"format", "ply"},
-                               {"density", density_},
+                              {{"format", kind_.format},
+                               {"density", kind_.density},
                                {"coordinate_frame", "rig"},
-                               {"rate_hz", rate_hz_},
+                               {"rate_hz", kind_.rate_hz},
                                {"transport", "memfd"}});
   if (!subscribed) return subscribed.error();
   for (;;) {

@@ -17,19 +17,25 @@
 
 namespace slsd::web {
 
-/// A cloud from the service: a PLY, and its description.
+/// A cloud from the service: its file, and its description.
 struct WatchedCloud {
   std::uint64_t number = 0;
   nlohmann::json about;
-  client::Bytes ply;
+  client::Bytes file;
 };
 using SharedCloud = std::shared_ptr<const WatchedCloud>;  // shared: watchers send it at their own pace
 
-/// The newest cloud of one density for any number of watchers, from one subscription while somebody watches.
+/// The newest cloud of one kind for any number of watchers, from one subscription while somebody watches.
 /// @thread thread-safe
 class CloudFeed {
  public:
-  CloudFeed(std::filesystem::path socket, std::string density, double rate_hz);
+  /// The density and format of the clouds, and how many come in a second at most.
+  struct Kind {
+    std::string density, format;
+    double rate_hz;
+  };
+
+  CloudFeed(std::filesystem::path socket, Kind kind);
   CloudFeed(const CloudFeed&) = delete;
   CloudFeed& operator=(const CloudFeed&) = delete;
 
@@ -42,8 +48,7 @@ class CloudFeed {
   [[nodiscard]] bool wanted() const;
 
   std::filesystem::path socket_;
-  std::string density_;
-  double rate_hz_;
+  Kind kind_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::chrono::steady_clock::time_point wanted_until_{};

@@ -32,7 +32,7 @@ constexpr std::size_t kBodyMax = 16 << 10;
 constexpr auto kWaitForCloud = 10s;
 constexpr auto kTimeout = 90s;
 constexpr auto kTimeoutOfStatus = 5s;  // the service answers at once, unless it hangs
-constexpr double kSymbolsHz = 15.0, kPixelsHz = 5.0;
+constexpr double kSymbolsHz = 15.0, kPixelsHz = 5.0, kMapsHz = 3.0;
 constexpr std::size_t kPastMax = 50;
 constexpr std::size_t kPastBytesMax = 48 << 20;
 constexpr std::size_t kScriptBytesMax = 4 << 20;
@@ -139,8 +139,9 @@ Answer PageServer::result_or_refusal(const tl::expected<Answered, Failure>& answ
 PageServer::PageServer(PageOptions options, Token token)
     : options_(std::move(options)),
       token_(std::move(token)),
-      symbols_(options_.socket, "symbols", kSymbolsHz),
-      pixels_(options_.socket, "pixels", kPixelsHz),
+      symbols_(options_.socket, {"symbols", "ply", kSymbolsHz}),
+      pixels_(options_.socket, {"pixels", "ply", kPixelsHz}),
+      maps_(options_.socket, {"pixels", "pcd", kMapsHz}),
       hand_eye_(options_.looks, options_.socket),
       model_(options_.model, options_.socket) {
   add_pages();
@@ -444,16 +445,20 @@ Answer PageServer::look(const Request& request) const {
 
 Answer PageServer::cloud(const Request& request) {
   const std::string density = parameter(request, "density"), text = parameter(request, "after");
+  const std::string organised = parameter(request, "organised");
   std::uint64_t after = 0;
   const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), after);
   if (!is_density(density) || wrong != std::errc() || end != text.data() + text.size())
     return refusal(400, "invalid_params", "\"density\" must be \"symbols\" or \"pixels\", and \"after\" a number");
-  const auto next = (density == "pixels" ? pixels_ : symbols_).next(after, kWaitForCloud);
+  if (!organised.empty() && (organised != "1" || density != "pixels"))
+    return refusal(400, "invalid_params", "\"organised\" must be 1, and is for clouds of pixels");
+  CloudFeed& feed = density == "symbols" ? symbols_ : organised.empty() ? pixels_ : maps_;
+  const auto next = feed.next(after, kWaitForCloud);
   if (!next) return refusal_of(next.error());
   if (!*next) return {204, "", {}, {}, {}};
   json about = brief((*next)->about);
   about["number"] = (*next)->number;
-  return cloud_answer((*next)->ply, about);
+  return cloud_answer((*next)->file, about);
 }
 
 Answer PageServer::scan(const json& body) {

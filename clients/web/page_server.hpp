@@ -106,6 +106,7 @@ class PageServer {
   std::map<std::string, Route, std::less<>> routes_;
   CloudFeed symbols_;
   CloudFeed pixels_;
+  CloudFeed maps_;  ///< of pixels, too, with the place of each
   HandEye hand_eye_;
   ModelSession model_;
   std::mutex mutex_;

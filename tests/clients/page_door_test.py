@@ -100,6 +100,8 @@ class Door(unittest.TestCase):
                     web.post("/api/project", picture={"a": 1}): (400, "invalid_params"),
                     web.get("/api/cloud?density=symbols&after=-1"): (400, "invalid_params"),
                     web.get("/api/cloud?density=all&after=1"): (400, "invalid_params"),
+                    web.get("/api/cloud?density=symbols&after=1&organised=1"): (400, "invalid_params"),
+                    web.get("/api/cloud?density=pixels&after=1&organised=yes"): (400, "invalid_params"),
                     web.get("/api/past?scan=..%2f..%2fetc"): (404, "not_found"),
                     web.get("/api/frame?camera=nobody"): (502, "not_found"),
                     web.get("/api/nothing"): (404, "not_found")}.items():

@@ -160,7 +160,87 @@ class Maps(unittest.TestCase):
                 const part = map.drawClipping(frame).clipped, pixels = map.canvas.getContext('2d').getImageData(0, 0, 8, 2).data;
                 return [part, ...pixels.slice(12, 16), ...pixels.slice(16, 20)];"""), [1 / 16, 255, 0, 0, 255, 100, 100, 100, 255])
 
-    def test_a_live_cloud_of_pixels_has_no_map_and_the_page_says_so(self):
+    def live(self, browser, wanted):
+        if browser.run("return document.getElementById('cloud-live').checked;") != wanted:
+            browser.click("#cloud-live")
+
+    def test_maps_follow_live_clouds_of_pixels(self):
+        with Service() as service, Web(service) as web, tempfile.TemporaryDirectory() as downloads, Browser(downloads) as browser, \
+                service.client() as client:
+            service.wait_ready()
+            self.open(browser, web)
+            self.choose(browser, "density", "pixels")
+            self.live(browser, True)
+            browser.wait("view.ply && view.ply.count > 10000", "no live cloud")
+            self.choose(browser, "shown-as", "z")
+            browser.wait("Boolean(map.records)", "no map")
+            cloud = pixels_of(client.call("scan", format="pcd", density="pixels", timeout_ms=600000)[1])
+            measured = np.argwhere(~np.isnan(cloud["z"]))
+            v, u = measured[len(measured) // 2].tolist()
+            text = self.read(browser, u, v)  # and without a move of the mouse, it follows the next clouds
+            browser.run("document.getElementById('under-cursor').textContent = '';")
+            number = browser.run("return shownScan.number;")
+            browser.wait(f"shownScan.number > {number} && document.getElementById('under-cursor').textContent", "it does not follow")
+            self.assertTrue(text.startswith(f"px {u}, {v}: x "), text)
+            np.testing.assert_allclose(self.numbers(text)[:3], [cloud[v, u][each] for each in "xyz"], atol=1)
+            for kind, words in (("sigma_mm", "mm of sigma"), ("z", "mm of depth")):
+                self.choose(browser, "shown-as", kind)
+                number = browser.run("return shownScan.number;")
+                browser.wait(f"shownScan.number > {number} && document.getElementById('scale').textContent.includes('{words}')", "no map")
+            self.assertTrue(browser.run("return document.getElementById('message').hidden;"))
+            browser.picture(self.folder / "map-live-1600.png")
+            self.live(browser, False)
+            browser.click("#save-pcd")  # what is on the map is what came
+            shown = pixels_of(downloaded(downloads, "*.pcd")[0].read_bytes())
+            self.assertEqual(browser.run("return [map.canvas.width, map.canvas.height];"), list(shown.shape[::-1]))
+            self.check_colours(browser, shown["z"])
+            for v, u in np.argwhere(~np.isnan(shown["z"]))[:: len(measured) // 5].tolist():
+                point = shown[v, u]
+                np.testing.assert_allclose(self.numbers(self.read(browser, u, v)),
+                                           [point["x"], point["y"], point["z"], point["sigma_mm"]], atol=0.006)
+            browser.resize(390, 844)
+            browser.click("nav [data-view=cloud]")
+            self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), 390)
+            self.assertEqual(browser.complaints(), [])
+
+    def test_the_newest_live_cloud_wins_and_frames_of_clipping_are_few(self):
+        with Service() as service, Web(service) as web, Browser() as browser:
+            service.wait_ready()
+            self.open(browser, web)
+            browser.run("""
+                window.shown = [], window.frames = [], window.under = 0, window.slow = 700;
+                const show = showCloud, frame = askFrame;
+                showCloud = (buffer, about) => {
+                  window.shown.push(about.number);
+                  for (const end = performance.now() + window.slow; performance.now() < end;) ;  // slower than the clouds come
+                  show(buffer, about);
+                };
+                askFrame = async (...asked) => {
+                  window.frames.push([performance.now(), ++window.under]);
+                  try { return await frame(...asked); } finally { --window.under; }
+                };""")
+            self.choose(browser, "density", "symbols")
+            self.live(browser, True)
+            browser.wait("Boolean(view.ply)", "no live cloud")
+            self.choose(browser, "shown-as", "clipping")
+            browser.wait("/% of the frame/.test(document.getElementById('scale').textContent)", "no map of clipping")
+            browser.wait("window.shown.length >= 6 && window.frames.length >= 2", "no more clouds")
+            shown, frames = browser.run("return [window.shown, window.frames];")
+            self.assertGreater(max(np.diff(shown)), 1)  # some were left out
+            self.assertEqual({under for _, under in frames}, {1})
+            self.assertGreaterEqual(min(np.diff([asked for asked, _ in frames])), 1000)
+            browser.run("window.slow = 0;")
+            for density, symbols in (("symbols", "true"), ("pixels", "false")):
+                self.choose(browser, "density", density)
+                number = browser.run("return shownScan.scan;")
+                browser.wait(f"shownScan.scan !== '{number}' && Boolean(view.ply.fields.symbol) === {symbols} && Boolean(map.records) && "
+                             "Boolean(clipped) && map.canvas.width === clipped.frame.width", "no map of clipping")
+                self.read(browser, 10, 10)
+            self.live(browser, False)
+            browser.wait("clipped && clipped.scan === shownScan", "the last cloud has an older frame")
+            self.assertEqual(browser.complaints(), [])
+
+    def test_a_cloud_of_pixels_that_was_live_in_space_has_no_map_and_the_page_says_so(self):
         with Service() as service, Web(service) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web)

@@ -4,7 +4,7 @@
 
 // The clouds as slsd writes them (docs/formats.md). Both readers give the same: a PLY, and how to make the organised PCD
 // of it; and as `cells` the record of the point in each cell of the organised cloud, -1 where there is none. Clouds of symbols come as PLY, whose points say where on the lattice they are; clouds of pixels come as PCD when
-// they are scanned, and as PLY, which does not say it, when they are live.
+// they are scanned or live on a map, else as PLY, which does not say it.
 
 function readCloud(buffer) {
   const begin = new TextDecoder("latin1").decode(new Uint8Array(buffer, 0, Math.min(6, buffer.byteLength)));

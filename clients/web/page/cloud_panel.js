@@ -5,12 +5,16 @@
 // The view "Cloud": scans, live clouds, the cloud in space or as a map, what lies under the cursor, distances.
 let view = null, map = null, measurements = null, overlay = null;
 let shownScan = null;
-let clippedFrame = null;  // of the scan that is shown, once the map of clipping was asked for
+let clipped = null;  // the frame of the map of clipping, its camera and its scan, once it was asked for
+let clippedAsked = false, clippedSince = 0;
+const kClippedPause = 1000;  // ms between two frames of live clouds, as each of them costs a cloud
+
+const isLive = () => $("cloud-live").checked;
 
 function showCloud(buffer, about) {
   const changed = shownScan && shownScan.density !== about.density;
   shownScan = about;
-  clippedFrame = null;
+  if (!isLive()) clipped = null;
   if (changed || (view.ply && view.ply.count === 0)) view.framed = false;
   const ply = readCloud(buffer);
   offerDepths(ply);
@@ -19,7 +23,8 @@ function showCloud(buffer, about) {
   showBox();
   offerColours();
   measurements.clear();  // which draws
-  $("under-cursor").textContent = "";
+  if (cursor) askCursor(cursor);
+  else $("under-cursor").textContent = "";
   $("cloud-figures").textContent = `${about.points.toLocaleString("en")} points of scan ${about.scan}, ${about.time}` +
     (about.decode_ms !== undefined ? `; decoded in ${about.decode_ms.toFixed(0)} ms` : "") +
     (about.sigma_calibration_mm !== undefined ?
@@ -53,6 +58,7 @@ function drawShown() {
   $("space").hidden = $("space-overlay").hidden = isMap();
   $("map").hidden = !isMap();
   $("colour").disabled = $("shaded").disabled = isMap();
+  if ($("shown-as").value !== "clipping") say("clipping", null);
   if (!view || !view.ply) return;
   if (!isMap()) {
     view.drawDistances(measurements);
@@ -63,16 +69,34 @@ function drawShown() {
   drawMap().then(() => say("map", null), (error) => say("map", error));
 }
 
+// A frame for the map of clipping, unless one is under way: live clouds do not wait for it, and none is asked for twice.
+async function askClipped() {
+  const live = isLive(), camera = $("which-camera").value, scan = shownScan;
+  if (clippedAsked || (live && Date.now() < clippedSince + kClippedPause)) return;
+  clippedAsked = true;
+  try {
+    const frame = await askFrame(camera, false);
+    if (live || scan === shownScan) clipped = {frame, camera, scan};
+    say("clipping", null);
+  } catch (error) {
+    say("clipping", error);
+    return;
+  } finally {
+    [clippedAsked, clippedSince] = [false, Date.now()];
+  }
+  drawShown();
+}
+
 async function drawMap() {
   const kind = $("shown-as").value, camera = Math.max(0, $("which-camera").selectedIndex);
-  if (kind === "clipping" && !clippedFrame) {
-    const scan = shownScan;
-    const frame = await askFrame($("which-camera").value, false);
-    if (scan !== shownScan || $("shown-as").value !== kind) return;
-    clippedFrame = frame;
+  if (kind === "clipping") {
+    const ofCamera = clipped && clipped.camera === $("which-camera").value;
+    if (!ofCamera || clipped.scan !== shownScan) askClipped();
+    if (!ofCamera) return;
   }
-  const drawn = map.draw(view.ply, camera, sizeOfCamera(camera), kind, clippedFrame, depthLimits);
+  const drawn = map.draw(view.ply, camera, sizeOfCamera(camera), kind, clipped && clipped.frame, depthLimits);
   if (!drawn) {
+    if (isLive()) return;  // the next cloud has a map
     $("shown-as").value = "space";
     drawShown();
     throw new Error("A live cloud of pixels does not say where its pixels are. Press Scan for a map.");
@@ -84,7 +108,8 @@ async function drawMap() {
 
 // ---- under the cursor ----
 
-let wantedCursor = null;
+let cursor = null;  // where it lies in the view
+let cursorAsked = false;
 
 function placeIn(event) {
   const place = event.currentTarget.getBoundingClientRect();
@@ -103,9 +128,9 @@ const pointAt = (x, y) => {
 };
 
 function tellCursor() {
-  const [x, y] = wantedCursor;
-  wantedCursor = null;
-  if (!view || !view.ply) return;
+  cursorAsked = false;
+  if (!view || !view.ply || !cursor) return;
+  const [x, y] = cursor;
   const point = pointAt(x, y), pixel = isMap() ? `px ${map.pixelAt(x, y).join(", ")}: ` : "";
   $("under-cursor").textContent = pixel + (point === null ? "no point here" :
     `x ${point.at[0].toFixed(2)}  y ${point.at[1].toFixed(2)}  z ${point.at[2].toFixed(2)} mm ± ${point.sigma.toFixed(2)} mm`);
@@ -113,8 +138,17 @@ function tellCursor() {
 
 function followCursor(event) {
   if (event.buttons) return;  // it turns the cloud
-  if (!wantedCursor) requestAnimationFrame(tellCursor);
-  wantedCursor = placeIn(event);
+  askCursor(placeIn(event));
+}
+
+function askCursor(place) {
+  cursor = place;
+  if (!cursorAsked) requestAnimationFrame(tellCursor);
+  cursorAsked = true;
+}
+
+function leaveCursor() {
+  cursor = null;  // what it said stays, until another cloud comes
 }
 
 // ---- scans ----
@@ -128,21 +162,24 @@ async function scan() {
   if (preset.preset) await presetWasScanned();
 }
 
+// A map of pixels needs their places, which make a cloud larger.
+const kindOfLive = () => "density=" + $("density").value + ($("density").value === "pixels" && isMap() ? "&organised=1" : "");
+
 async function followCloud() {
-  let after = 0, density = null;
+  let after = 0, kind = null;
   for (;;) {
-    if (!$("cloud-live").checked || document.hidden) {
+    if (!isLive() || document.hidden) {
       await pause(50);
       continue;
     }
-    if (density !== $("density").value) [density, after] = [$("density").value, 0];
+    if (kind !== kindOfLive()) [kind, after] = [kindOfLive(), 0];
     try {
-      const response = await ask(`api/cloud?density=${density}&after=${after}`);
+      const response = await ask(`api/cloud?${kind}&after=${after}`);
       if (response.status === 204) continue;
       const buffer = await response.arrayBuffer();
       const about = aboutOf(response);
       after = about.number;
-      if ($("cloud-live").checked && $("density").value === density) showCloud(buffer, about);
+      if (isLive() && kind === kindOfLive()) showCloud(buffer, about);
       say("cloud", null);
       await new Promise((done) => requestAnimationFrame(done));
     } catch (error) {
@@ -162,7 +199,10 @@ function beginCloud() {
   onClick($("save-pcd"), async () => saveAs(new Blob(view.ply.pcd()), shownScan.scan + ".pcd"));
   onClick($("clear-distances"), async () => measurements.clear());
   $("save-ply").disabled = $("save-pcd").disabled = true;
-  $("cloud-live").addEventListener("change", () => say("cloud", null));
+  $("cloud-live").addEventListener("change", () => {
+    say("cloud", null);
+    drawShown();
+  });
   $("colour").addEventListener("change", () => {
     if (view) view.colour = $("colour").value;
     if (view && view.paint()) drawShown();
@@ -187,6 +227,7 @@ function beginCloud() {
 function beginPointing(place) {
   let pressed = null;
   place.addEventListener("pointermove", followCursor);
+  place.addEventListener("pointerleave", leaveCursor);
   place.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
   place.addEventListener("pointerup", (event) => {
     const moved = pressed && Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]);
