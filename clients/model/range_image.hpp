@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -43,6 +44,13 @@ struct RangeImage {
     return {static_cast<float>(seen.u - left), static_cast<float>(seen.v - top)};
   }
 };
+
+/// The nearest colour of 8 bits to a mean of some.
+[[nodiscard]] inline Rgb to_rgb(const Eigen::Vector3f& mean) {
+  Rgb colour;
+  for (int i = 0; i < 3; ++i) colour[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(std::lround(mean[i]));
+  return colour;
+}
 
 using Box = Eigen::AlignedBox3f;
 

@@ -417,15 +417,17 @@ class Model(unittest.TestCase):
         views = [coloured(cloud(bumpy_ball, degrees, degrees)) for degrees in range(0, 360, 30)]
         scanner, asked = self.scanner(views, colour=True)
         done = subprocess.run((PROGRAM, "--socket", scanner.path, "--turntable", "--views", "12", "--colour", "-o",
-                               self.folder / "t.ply", "--json"), input="\n" * 12, capture_output=True, text=True, timeout=600, check=False)
+                               self.folder / "t.ply", "--json", "--preview", self.folder / "t_preview.ply"), input="\n" * 12, capture_output=True, text=True, timeout=600, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(len(asked), 12)
         self.assertEqual(len(json.loads(done.stdout)["fused"]), 12)
         self.assertIn("view 11 of 12 is placed; turn by 30 degrees, then press Enter", done.stderr)
         vertices = mesh_ply((self.folder / "t.ply").read_bytes())[0]
         self.assertLess(np.quantile(abs(off_truth_mm(vertices)), 0.95), 0.15)
+        preview = self.preview(self.folder / "t_preview.ply")
         for name, level in (("red", 200), ("green", 100), ("blue", 50)):
-            self.assertLess(abs(vertices[name].astype(int) - level).max(), 2)
+            for points in (vertices, preview):
+                self.assertLess(abs(points[name].astype(int) - level).max(), 2)
 
     def test_a_session_that_cannot_go_on_writes_the_model_so_far(self):
         scanner, _ = self.scanner(self.clouds[:6], {6: "not_calibrated"}.items())

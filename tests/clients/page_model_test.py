@@ -19,7 +19,7 @@ import numpy as np
 from browser import Browser, is_there
 from impostor import Impostor, result
 from mesh_test import mesh_ply
-from model_test import bumpy_ball, calibration, cloud, nothing, off_truth_mm, room
+from model_test import bumpy_ball, calibration, cloud, coloured, nothing, off_truth_mm, room
 from page_service import Web, downloaded, name_of
 
 from service import BIN, TIMEOUT_S, Service, wait_until
@@ -84,6 +84,8 @@ class Scanner:
                 self.changed.wait_for(lambda: self.allowed > self.scans)
                 self.scans += 1
             body = view((self.scans - 1) * self.step)
+            if request["params"].get("colour"):
+                body = coloured(body)
         return result(request, body, scan=f"s-{self.scans}", bytes=len(body), format="ply")
 
 
@@ -191,6 +193,8 @@ class Requests(ModelTest):
                           {"action": "start", "close": 1}, {"action": "start", "views": 12}, {"action": "start", "turntable": True},
                           {"action": "start", "turntable": True, "views": 7}, {"action": "start", "turntable": True, "views": "9"},
                           {"action": "start", "turntable": True, "views": 12, "until_closed": True},
+                          {"action": "start", "colour": True}, {"action": "start", "turntable": True, "views": 12, "colour": 1},
+                          {"action": "build", "colour": True},
                           {"action": "start", "box": [1, 2, 3]}, {"action": "start", "box": [0, 0, 0, 1, 0, 1]},
                           {"action": "start", "box": [0, 0, "0", 1, 1, 1]}, {"action": "start", "voxel_mm": 0},
                           {"action": "build", "turntable": True, "views": 12}):
@@ -428,6 +432,35 @@ class Operator(ModelTest):
                 self.open(browser, web, width, height, scheme)
                 browser.wait("Boolean(modelView && modelView.ply)", "nothing is drawn of a model that is ready")
                 self.picture(browser, "ready-" + scheme, width)
+            self.assertEqual(browser.complaints(), [])
+
+    def test_the_growing_model_has_the_colour_of_the_surface(self):
+        with Service() as service, Scanner(service, 30) as scanner, self.web(scanner) as web, Browser() as browser:
+            service.wait_ready()
+            self.open(browser, web)
+            self.choose(browser, "model-turned", "table")
+            self.choose(browser, "model-views", str(VIEWS))
+            browser.click("#model-tinted")
+            browser.click("#model-start")
+            self.scan_views(browser, scanner, 1, 3)
+            drawn = "[...modelView.points.geometry.getAttribute('colour').array.slice(0, 3)]"
+            browser.wait("Boolean(modelView && modelView.ply && modelView.ply.fields.red)", "no colours")
+            browser.wait(f"{drawn}.join() === '200,100,50'", "it is not drawn in its colours")
+            self.assertEqual(browser.run("return document.getElementById('model-colour').value;"), "own")
+            self.picture(browser, "coloured", 1280)
+            self.choose(browser, "model-colour", "plain")
+            self.scan_views(browser, scanner, 4, 4)
+            browser.wait("modelPreview === modelTold.previews", "nothing new is drawn")
+            self.assertEqual(browser.run("return document.getElementById('model-colour').value;"), "plain")  # as was chosen
+            browser.click("#model-stop")
+            scanner.let(1)
+            browser.wait("modelTold.state === 'done' && modelPreview === modelTold.previews", "no model")
+            self.choose(browser, "model-colour", "own")
+            level = browser.run(f"return {drawn};")
+            np.testing.assert_allclose(level, (200, 100, 50), atol=2)
+            self.open(browser, web, 390, 844)
+            browser.wait("Boolean(modelView && modelView.ply)", "nothing is drawn")
+            self.picture(browser, "coloured", 390)
             self.assertEqual(browser.complaints(), [])
 
     def test_a_press_that_deletes_asks_once_more(self):

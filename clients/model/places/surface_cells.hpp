@@ -42,6 +42,7 @@ inline constexpr std::array kCellSteps{16, 8, 4};
 struct SurfaceView {
   RangeImage image;
   std::array<CellGrid, kCellSteps.size()> levels;
+  std::vector<Rgb> colours;  ///< means of the cells of the finest level; empty: the cloud has none
 };
 
 /// All that one frame measured.

@@ -12,12 +12,15 @@
 #include <fmt/format.h>
 #include <Eigen/Geometry>
 
+#include "core/colour.hpp"
+
 namespace slsd::model {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the records are copied as they lie in memory");
 
 constexpr int kAxisBits = 21;  // of a key
+constexpr std::uint8_t kColourless = 128;
 
 template <class Value>
 void put_value(std::string& bytes, const Value& value) {
@@ -52,6 +55,12 @@ PreviewPoints::Cube& PreviewPoints::add(const Eigen::Vector3f& place_mm, const E
   return cube;
 }
 
+void PreviewPoints::add_colour(Cube& cube, const Rgb& colour) {
+  cube.colour += Eigen::Vector3f(colour[0], colour[1], colour[2]);
+  ++cube.with_colour;
+  has_colour_ = true;
+}
+
 /// Doubles the edges until half of the room is free.
 void PreviewPoints::enlarge() {
   while (cubes_.size() > most_ / 2) {
@@ -64,6 +73,8 @@ void PreviewPoints::enlarge() {
       cube.added += old.added;
       cube.sigma_mm += old.sigma_mm;
       cube.with_sigma += old.with_sigma;
+      cube.colour += old.colour;
+      cube.with_colour += old.with_colour;
       cube.frames = std::max(cube.frames, old.frames);
       cube.latest = std::max(cube.latest, old.latest);
     }
@@ -78,11 +89,14 @@ void PreviewPoints::add(const Shot& shot, const RigidTransform& object_from_rig)
   const Eigen::Matrix3f rotation = object_from_rig.rotation.cast<float>();
   const Eigen::Vector3f translation = object_from_rig.translation.cast<float>();
   for (const SurfaceView& view : shot.views) {
-    for (const SurfaceCell& cell : view.levels.back().cells) {
+    const std::vector<SurfaceCell>& cells = view.levels.back().cells;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const SurfaceCell& cell = cells[i];
       if (cell.sigma_mm <= 0) continue;
       Cube& cube = add(rotation * cell.place_mm + translation, rotation * cell.normal);
       if (cube.latest != shots_) ++cube.frames;
       cube.latest = shots_;
+      if (!view.colours.empty()) add_colour(cube, view.colours[i]);
     }
   }
 }
@@ -95,6 +109,7 @@ void PreviewPoints::add(const Mesh& mesh) {
   const std::vector<Eigen::Vector3f> normals = normals_of(mesh);
   for (std::size_t i = 0; i < mesh.vertices_mm.size(); ++i) {
     Cube& cube = add(mesh.vertices_mm[i], normals[i]);
+    if (!mesh.colours.empty()) add_colour(cube, mesh.colours[i]);
     if (!mesh.frames.empty()) cube.frames = std::max<std::uint32_t>(cube.frames, mesh.frames[i]);
     if (!has_sigma_ || std::isnan(mesh.sigma_mm[i])) continue;
     cube.sigma_mm += mesh.sigma_mm[i];
@@ -110,8 +125,10 @@ std::string PreviewPoints::to_ply() const {
       "ply\nformat binary_little_endian 1.0\ncomment units mm\ncomment spacing_mm {:.4f}\nelement vertex {}\n",
       edge_mm_, keys.size());
   for (const char* const field : {"x", "y", "z", "nx", "ny", "nz"}) bytes += fmt::format("property float {}\n", field);
-  bytes += has_sigma_ ? "property float sigma_mm\nproperty uchar frames\nend_header\n"
-                      : "property uchar frames\nend_header\n";
+  if (has_sigma_) bytes += "property float sigma_mm\n";
+  bytes += "property uchar frames\n";
+  if (has_colour_) bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+  bytes += "end_header\n";
   for (const Key key : keys) {
     const Cube& cube = cubes_.at(key);
     put_value(bytes, Eigen::Vector3f(cube.place_mm / cube.added));
@@ -119,6 +136,8 @@ std::string PreviewPoints::to_ply() const {
     if (has_sigma_)
       put_value(bytes, cube.with_sigma > 0 ? cube.sigma_mm / cube.with_sigma : std::numeric_limits<float>::quiet_NaN());
     put_value(bytes, static_cast<std::uint8_t>(std::min(cube.frames, 255U)));
+    if (has_colour_)
+      put_value(bytes, cube.with_colour > 0 ? to_rgb(cube.colour / cube.with_colour) : grey_of(kColourless));
   }
   return bytes;
 }

@@ -67,8 +67,8 @@ tl::expected<json, Refusal> choices_of(const json& body, bool modes) {
   json choices = json::object();
   for (const auto& [key, value] : body.items()) {
     if (key == "action") continue;
-    const bool is_flag =
-        key == "close" || key == "use_background" || (modes && (key == "until_closed" || key == "turntable"));
+    const bool is_flag = key == "close" || key == "use_background" ||
+                         (modes && (key == "until_closed" || key == "turntable" || key == "colour"));
     const bool is_number = key == "voxel_mm" || (modes && key == "views");
     if (!is_flag && !is_number && key != "box")
       return tl::unexpected(invalid("no such parameter: \"" + printable(key, 64) + "\""));
@@ -83,6 +83,9 @@ tl::expected<json, Refusal> choices_of(const json& body, bool modes) {
     return tl::unexpected(invalid("\"views\" must be 8 to 360"));
   if (has_true(choices, "turntable") != choices.contains("views"))
     return tl::unexpected(invalid("a turntable needs \"views\", and nothing else does"));
+  if (has_true(choices, "colour") && !has_true(choices, "turntable"))
+    return tl::unexpected(
+        invalid("\"colour\" needs a turntable: the object must stand still for its frame in white light"));
   if (has_true(choices, "turntable") && has_true(choices, "until_closed"))
     return tl::unexpected(invalid("a turntable ends after its views"));
   return choices;
@@ -221,6 +224,7 @@ std::optional<Refusal> ModelSession::start(const json& choices) {
   if (has_true(choices, "until_closed")) arguments.emplace_back("--until-closed");
   if (has_true(choices, "turntable"))
     arguments.insert(arguments.end(), {"--turntable", "--views=" + choices["views"].dump()});
+  if (has_true(choices, "colour")) arguments.emplace_back("--colour");
   return run(std::move(arguments), choices, kFollowing);
 }
 

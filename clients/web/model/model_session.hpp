@@ -41,8 +41,8 @@ class ModelSession {
   [[nodiscard]] nlohmann::json look() const;
   /// Carries out what the page asks for:
   ///
-  ///     start              a new model, with the optional `until_closed`, or `turntable` and its `views`; `close`,
-  ///                        `use_background`, `box`, `voxel_mm`. The model before is deleted
+  ///     start              a new model, with the optional `until_closed`, or `turntable`, its `views` and `colour`;
+  ///                        `close`, `use_background`, `box`, `voxel_mm`. The model before is deleted
   ///     next               scan the next view of the turntable
   ///     stop               build the model of the clouds so far
   ///     build              build it again of the kept clouds, with `close`, `use_background`, `box`, `voxel_mm`

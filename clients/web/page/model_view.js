@@ -135,11 +135,15 @@ function showModel(told) {
 function paintModel() {
   if (!modelView || !modelView.ply) return;
   const colour = $("model-colour");
-  colour.querySelector("[value=sigma_mm]").disabled = !modelView.ply.fields.sigma_mm;
-  if (colour.value === "sigma_mm" && !modelView.ply.fields.sigma_mm) colour.value = "plain";
+  for (const [value, field] of [["sigma_mm", "sigma_mm"], ["own", "red"]]) {
+    const has = Boolean(modelView.ply.fields[field]), option = colour.querySelector(`[value=${value}]`);
+    if (value === "own" && has && option.disabled && colour.value === "plain") colour.value = "own";  // once, when it comes
+    option.disabled = !has;
+    if (!has && colour.value === value) colour.value = "plain";
+  }
   modelView.colour = colour.value;
   modelView.paint();
-  if (colour.value === "plain") $("model-scale").replaceChildren();
+  if (["plain", "own"].includes(colour.value)) $("model-scale").replaceChildren();
   else showColourBar($("model-scale"), modelView.range, false, colour.value === "frames" ? "clouds; the mesh has what two or more show" : "mm of sigma");
 }
 
@@ -173,7 +177,8 @@ function modelChoices() {
 
 function wayOfTurning() {
   const way = $("model-turned").value;
-  return way === "table" ? {turntable: true, views: Number($("model-views").value)} : {until_closed: way === "closed"};
+  if (way !== "table") return {until_closed: way === "closed"};
+  return {turntable: true, views: Number($("model-views").value), ...($("model-tinted").checked ? {colour: true} : {})};
 }
 
 async function actOnModel(action, choices = {}) {
@@ -208,7 +213,7 @@ async function followModel() {
 }
 
 function showWayOfTurning() {
-  $("model-views-label").hidden = $("model-turned").value !== "table";
+  $("model-views-label").hidden = $("model-tinted-label").hidden = $("model-turned").value !== "table";
   if (modelTold) showModelButtons(modelTold);
   else $("model-next").hidden = true;
 }

@@ -88,6 +88,30 @@ TEST(PreviewPoints, OfAMeshHaveItsSigmasAndFrames) {
   }
 }
 
+TEST(PreviewPoints, HaveTheColoursOfTheClouds) {
+  auto images = *range_images(measure(smooth_ball, rig_from_object(0), 0.05F, 1), test_calibration(), std::nullopt);
+  for (RangeImage& image : images) image.colours.assign(image.depth_mm.size(), Rgb{200, 100, 50});
+  PreviewPoints preview(60'000), few(300);
+  for (PreviewPoints* const each : {&preview, &few}) {
+    each->add(make_shot(images), place_at(0));
+    const std::string ply = each->to_ply();
+    EXPECT_THAT(ply, testing::HasSubstr("frames\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nend_"));
+    EXPECT_EQ(ply.substr(ply.size() - 3), "\xC8\x64\x32");
+  }
+}
+
+TEST(PreviewPoints, OfAMeshHaveItsColours) {
+  Mesh mesh;
+  mesh.vertices_mm = {{0, 0, 0}, {0, 10, 0}, {10, 0, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.colours = {{1, 2, 3}, {1, 2, 3}, {1, 2, 3}};
+  PreviewPoints preview(100);
+  preview.add(mesh);
+  const std::string ply = preview.to_ply();
+  EXPECT_THAT(ply, testing::HasSubstr("property uchar blue\n"));
+  EXPECT_EQ(ply.substr(ply.size() - 3), "\x01\x02\x03");
+}
+
 TEST(PreviewPoints, OfNothingAreNone) {
   PreviewPoints preview(10);
   preview.add(Mesh{});
