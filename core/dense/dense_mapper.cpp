@@ -125,7 +125,6 @@ int DenseMapper::stride_px(const Lens& camera, const DenseOptions& options) {
 
 void DenseMapper::warm_up() {
   (void)fixed_->fields->usual();
-  map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
 }
 
 /// Computes the plane of each symbol: its depth, and the slopes that make the patch map match the grid of symbols.

@@ -81,6 +81,8 @@ class DenseMapper {
   /// Prepares in advance what the first frame would otherwise wait for.
   void warm_up();
 
+  /// The map of the last frame, whose memory the next one reuses. A caller may take it away, and give another.
+  [[nodiscard]] DenseMap& map() { return map_; }
   /// Returns the rays of the camera's pixels.
   [[nodiscard]] const std::shared_ptr<const RayGrid>& rays() const;
   /// The side of the patches to which the surface is fitted.

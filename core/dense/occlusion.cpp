@@ -20,6 +20,7 @@ namespace {
 constexpr float kBehind = 1.01F;
 /// Side of a tile, camera px, and of a cell, projector px.
 constexpr int kTilePx = RayGrid::kPitchPx, kCellPx = 8;
+constexpr std::size_t kTilePixels = kTilePx * kTilePx;
 static_assert(kTilePx == kLanes);
 /// Added around a tile's box, projector px: a lens bends the lines between its corners by less.
 constexpr float kMarginPx = 2;
@@ -195,23 +196,30 @@ void Occlusion::find_conflicts() {
   }
 }
 
+/// Makes room for the pixels of the exact tiles, which are a small part of most frames.
+void Occlusion::place_exact_tiles() {
+  std::size_t count = 0;
+  for (Tile& tile : tiles_)
+    if (tile.exact) tile.first = std::exchange(count, count + kTilePixels);
+  pixel_.resize(count), distance_.resize(count);
+}
+
 void Occlusion::project_pixels(const DenseMap& map, int row) {
   const Eigen::Matrix3f turn = camera_.projector_from_camera.rotation.cast<float>();
   Rays here = rays_of(camera_, projector_);
   for (int column = 0; column < tile_columns_; ++column) {
-    if (!tiles_[static_cast<std::size_t>(row) * tile_columns_ + column].exact) continue;
+    const Tile& tile = tiles_[static_cast<std::size_t>(row) * tile_columns_ + column];
+    if (!tile.exact) continue;
     const int x = column * kTilePx, count = std::min(kTilePx, map.width - x);
     for (int y = row * kTilePx; y < std::min(map.height, (row + 1) * kTilePx); ++y) {
       const Eigen::Vector2f first = rays_->at(x, y), last = rays_->before_next(x, y);
       Eigen::Map<Eigen::Vector3f>(here.turned) = turn * first.homogeneous();
       Eigen::Map<Eigen::Vector3f>(here.per_px) = turn.leftCols<2>() * (last - first) / (RayGrid::kPitchPx - 1);
-      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
-      float depth[kLanes], distance[kLanes];
-      std::int32_t at[kLanes];
+      const std::size_t to = tile.first + static_cast<std::size_t>(y % kTilePx) * kTilePx;
+      float depth[kLanes];
       std::fill(depth, depth + kLanes, std::numeric_limits<float>::quiet_NaN());
-      std::copy_n(map.depth_mm.data() + pixel, count, depth);
-      Cloned<find_rays>::call(here, depth, at, distance);
-      std::copy_n(at, count, pixel_.data() + pixel), std::copy_n(distance, count, distance_.data() + pixel);
+      std::copy_n(map.depth_mm.data() + static_cast<std::size_t>(y) * map.width + x, count, depth);
+      Cloned<find_rays>::call(here, depth, pixel_.data() + to, distance_.data() + to);
     }
   }
 }
@@ -220,37 +228,40 @@ template <class Take>
 void Occlusion::for_each_exact(const DenseMap& map, const Take& take) const {
   for (int row = 0; row < tile_rows_; ++row) {
     for (int column = 0; column < tile_columns_; ++column) {
-      if (!tiles_[static_cast<std::size_t>(row) * tile_columns_ + column].exact) continue;
-      const int left = column * kTilePx, right = std::min(map.width, left + kTilePx);
-      for (int y = row * kTilePx; y < std::min(map.height, (row + 1) * kTilePx); ++y)
-        for (int x = left; x < right; ++x) take(static_cast<std::size_t>(y) * map.width + x);
+      const Tile& tile = tiles_[static_cast<std::size_t>(row) * tile_columns_ + column];
+      if (!tile.exact) continue;
+      const int left = column * kTilePx, top = row * kTilePx;
+      const int right = std::min(map.width, left + kTilePx), bottom = std::min(map.height, top + kTilePx);
+      for (int y = top; y < bottom; ++y)
+        for (int x = left; x < right; ++x)
+          take(static_cast<std::size_t>(y) * map.width + x,
+               tile.first + static_cast<std::size_t>((y - top) * kTilePx + x - left));
     }
   }
 }
 
 void Occlusion::drop_occluded(DenseMap& map, Executor& executor) {
-  pixel_.resize(map.depth_mm.size()), distance_.resize(map.depth_mm.size());
   nearest_.resize(static_cast<std::size_t>(projector_.width_px) * projector_.height_px);
   find_tiles(map, executor);
   find_conflicts();
+  place_exact_tiles();
   executor.run(tile_rows_, [&](int row, int) { project_pixels(map, row); });
-  for_each_exact(map, [&](std::size_t pixel) {
-    if (pixel_[pixel] >= 0) nearest_[pixel_[pixel]] = std::numeric_limits<float>::max();
+  for_each_exact(map, [&](std::size_t, std::size_t at) {
+    if (pixel_[at] >= 0) nearest_[pixel_[at]] = std::numeric_limits<float>::max();
   });
-  for_each_exact(map, [&](std::size_t pixel) {
-    if (pixel_[pixel] < 0) return;
-    float& nearest = nearest_[pixel_[pixel]];
-    nearest = std::min(nearest, distance_[pixel]);
+  for_each_exact(map, [&](std::size_t, std::size_t at) {
+    if (pixel_[at] < 0) return;
+    float& nearest = nearest_[pixel_[at]];
+    nearest = std::min(nearest, distance_[at]);
   });
-  for_each_exact(map, [&](std::size_t pixel) {
-    if (pixel_[pixel] >= 0 && distance_[pixel] > kBehind * nearest_[pixel_[pixel]])
-      map.drop(pixel, DensePixel::kOccluded);
+  for_each_exact(map, [&](std::size_t pixel, std::size_t at) {
+    if (pixel_[at] >= 0 && distance_[at] > kBehind * nearest_[pixel_[at]]) map.drop(pixel, DensePixel::kOccluded);
   });
 }
 
 void Occlusion::drop_beyond_the_light(DenseMap& map) const {
-  for_each_exact(map, [&](std::size_t pixel) {
-    if (pixel_[pixel] < 0 && map.measured(pixel)) map.drop(pixel, DensePixel::kUnlit);
+  for_each_exact(map, [&](std::size_t pixel, std::size_t at) {
+    if (pixel_[at] < 0 && map.measured(pixel)) map.drop(pixel, DensePixel::kUnlit);
   });
 }
 

@@ -33,11 +33,14 @@ class Occlusion {
     std::int32_t left = 0, top = 0, right = -1, bottom = -1;  // inclusive
     float nearest = 0, farthest = 0;                          // distance from the projector along its z axis, mm
     bool exact = false;                                       // projected pixel by pixel
+    std::size_t first = 0;  // of an exact tile: place of its first pixel in the arrays below
   };
   void find_tiles(const DenseMap& map, Executor& executor);
   void find_conflicts();
+  void place_exact_tiles();
   void project_pixels(const DenseMap& map, int row);
   [[nodiscard]] Tile tile_at(const DenseMap& map, int column, int row) const;
+  /// Calls with each pixel of the exact tiles, and its place in the arrays.
   template <class Take>
   void for_each_exact(const DenseMap& map, const Take& take) const;
 
@@ -48,7 +51,7 @@ class Occlusion {
   int tile_columns_ = 0, tile_rows_ = 0;
   std::vector<Tile> tiles_;
   std::vector<float> cell_nearest_, cell_farthest_;
-  std::vector<std::int32_t> pixel_;        // for each pixel of an exact tile: the projector's pixel, or -1
+  std::vector<std::int32_t> pixel_;        // for each pixel of the exact tiles: the projector's pixel, or -1
   std::vector<float> distance_, nearest_;  // for each of these, and for each pixel of the projector
 };
 

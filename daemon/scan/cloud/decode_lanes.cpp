@@ -15,8 +15,8 @@ std::size_t DecodeLanes::lanes_here() {
 }
 
 DecodeLanes::DecodeLanes(std::size_t lanes) : running_(std::min(lanes, kMaxLanes)) {
-  for (std::size_t lane = 0; lane < std::min(lanes, kMaxLanes); ++lane) {
-    threads_[lane] = std::jthread([this, lane](const std::stop_token& stop) { run(lane, stop); });
+  for (std::size_t thread = 0; thread < std::min(lanes, kMaxLanes); ++thread) {
+    threads_[thread] = std::jthread([this, thread](const std::stop_token& stop) { run(thread, stop); });
   }
 }
 
@@ -91,26 +91,28 @@ void DecodeLanes::append(Waiting waiting, std::unique_lock<std::mutex>& lock) {
   changed_.notify_all();
 }
 
-void DecodeLanes::run(std::size_t lane, const std::stop_token& stop) {
-  name_this_thread("decode " + std::to_string(lane));
+void DecodeLanes::run(std::size_t thread, const std::stop_token& stop) {
+  name_this_thread("decode " + std::to_string(thread));
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [this] { return !waiting_.empty(); })) {
     std::shared_ptr<FrameJob> job = std::move(waiting_.front().job);
     waiting_.pop_front();
     const std::uint64_t turn = taken_++;
+    const auto lane = static_cast<std::size_t>(std::ranges::find(busy_, false) - busy_.begin());
+    busy_[lane] = true;
     lock.unlock();
-    heartbeats_[lane].promise(kWorkPromise);
+    heartbeats_[thread].promise(kWorkPromise);
     if (!stop.stop_requested()) job->compute(lane);
-    deliver(*job, turn);
+    deliver(*job, turn, lane);
     job.reset();
-    heartbeats_[lane].rest();
+    heartbeats_[thread].rest();
     lock.lock();
   }
   --running_;
   changed_.notify_all();
 }
 
-void DecodeLanes::deliver(FrameJob& job, std::uint64_t turn) {
+void DecodeLanes::deliver(FrameJob& job, std::uint64_t turn, std::size_t lane) {
   {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return delivered_ == turn; });
@@ -119,6 +121,7 @@ void DecodeLanes::deliver(FrameJob& job, std::uint64_t turn) {
   {
     const std::lock_guard lock(mutex_);
     ++delivered_;
+    busy_[lane] = false;
   }
   changed_.notify_all();
 }

@@ -24,6 +24,7 @@ class FrameJob {
  public:
   virtual ~FrameJob() = default;
   /// The long part. Other lanes run other jobs at the same time.
+  /// @param lane  the lowest that is free, so that jobs which do not overlap share one lane's buffers
   virtual void compute(std::size_t lane) = 0;
   /// Delivers the result once. Follows compute(), or replaces it if the service stops. Runs for one job at a time, in
   /// order of arrival.
@@ -77,10 +78,10 @@ class DecodeLanes {
     bool may_be_skipped = false;
     MonotonicTime since;  ///< time of the offer, if the job may be skipped
   };
-  void run(std::size_t lane, const std::stop_token& stop);
+  void run(std::size_t thread, const std::stop_token& stop);
   void append(Waiting waiting, std::unique_lock<std::mutex>& lock);
   void make_room(MonotonicTime now);
-  void deliver(FrameJob& job, std::uint64_t turn);
+  void deliver(FrameJob& job, std::uint64_t turn, std::size_t lane);
 
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
@@ -90,6 +91,7 @@ class DecodeLanes {
   std::uint64_t delivered_ = 0;  ///< jobs delivered, of those taken
   std::uint64_t skipped_ = 0;
   std::size_t running_ = 0;
+  std::array<bool, kMaxLanes> busy_{};  ///< lanes with a job
   std::array<Heartbeat, kMaxLanes> heartbeats_;
   std::array<std::jthread, kMaxLanes> threads_;
 };

@@ -148,9 +148,10 @@ DenseView measure_pixels(const GreyView& frame, Decoder& decoder, DenseMapper& m
                          std::size_t camera, const SceneLight& light, const ScanRequest& request, ScanResult& result) {
   DecodedSymbols symbols = decoder.symbols();
   if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may come from the quotient image
+  if (DenseMap& map = mapper.map(); map.pixels.empty()) map = setup.dense->spare_map();
   DenseMap& map = request.of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
                                     : mapper.measure(frame, light.full, symbols, *setup.crew);
-  DenseView view{std::exchange(map, setup.dense->spare_map()),
+  DenseView view{std::exchange(map, {}),
                  mapper.rays(),
                  setup.calibration->cameras[decoder.camera_index()].rig_from_camera,
                  decoder.camera_index(),

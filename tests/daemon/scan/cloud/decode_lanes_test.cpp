@@ -27,16 +27,19 @@ class NumberJob final : public FrameJob {
 
   NumberJob(int number, Log& log, std::function<void()> work = {})
       : delivered_{number, false}, log_(log), work_(std::move(work)) {}
-  void compute(std::size_t) override {
+  void compute(std::size_t lane) override {
+    lane_ = lane;
     if (work_) work_();
     delivered_.computed = true;
   }
   void deliver() override { log_.push_back(delivered_); }
+  [[nodiscard]] std::size_t lane() const { return lane_; }
 
  private:
   Delivered delivered_;
   Log& log_;
   std::function<void()> work_;
+  std::atomic<std::size_t> lane_{DecodeLanes::kMaxLanes};
 };
 
 /// Work that ends when the gate is opened, and tells that it has begun.
@@ -73,6 +76,30 @@ TEST(DecodeLanes, DeliverInTheOrderOfArrivalWhicheverLaneIsQuicker) {
   ASSERT_EQ(log.size(), kJobs);
   for (int i = 0; i < kJobs; ++i) EXPECT_EQ(log[static_cast<std::size_t>(i)], (NumberJob::Delivered{i, true}));
   EXPECT_EQ(lanes.skipped(), 0U);
+}
+
+TEST(DecodeLanes, OfJobsThatDoNotOverlapShareTheFirst) {
+  NumberJob::Log log;
+  DecodeLanes lanes(2);
+  for (int i = 0; i < 50; ++i) {
+    const auto job = std::make_shared<NumberJob>(i, log);
+    lanes.push(job);
+    wait_for(lanes, static_cast<std::uint64_t>(i) + 1);
+    EXPECT_EQ(job->lane(), 0U);
+  }
+}
+
+TEST(DecodeLanes, OfJobsThatOverlapDiffer) {
+  NumberJob::Log log;
+  Gate gate;
+  DecodeLanes lanes(2);
+  const auto first = std::make_shared<NumberJob>(0, log, gate.work()),
+             second = std::make_shared<NumberJob>(1, log, gate.work());
+  lanes.push(first), lanes.push(second);
+  gate.wait_inside(2);
+  EXPECT_EQ(first->lane() + second->lane(), 1U);
+  gate.opened.set_value();
+  wait_for(lanes, 2);
 }
 
 /// One lane, whose job 0 is under way until the gate opens.
