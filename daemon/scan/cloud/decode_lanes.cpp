@@ -101,6 +101,7 @@ void DecodeLanes::run(std::size_t thread, const std::stop_token& stop) {
     const auto lane = static_cast<std::size_t>(std::ranges::find(busy_, false) - busy_.begin());
     busy_[lane] = true;
     lock.unlock();
+    changed_.notify_all();  // push() waits for room
     heartbeats_[thread].promise(kWorkPromise);
     if (!stop.stop_requested()) job->compute(lane);
     deliver(*job, turn, lane);
