@@ -88,12 +88,15 @@ def browse(options):
               "points are drawn while it turns")
         browser.run("document.getElementById('cloud-live').click(); window.clouds = 0;"
                     "const show = view.show.bind(view); view.show = (b) => { ++window.clouds; show(b); };")
-        browser.wait("window.clouds > 2", "no live clouds")
-        before, begin = browser.run("return window.clouds;"), time.monotonic()
-        time.sleep(options.seconds)
-        live = (browser.run("return window.clouds;") - before) / (time.monotonic() - begin)
-        points = browser.run("return view.ply.count;")
-        print(f"live dense clouds of {points} points a second: {live:.1f}; slsd-web has {resident_mib(web.process.pid):.0f} MiB")
+        for shown, what in (("space", "clouds"), ("z", "maps of depth"), ("clipping", "maps of clipping")):
+            browser.run("const shown = document.getElementById('shown-as'); shown.value = arguments[0];"
+                        "shown.dispatchEvent(new Event('change')); window.clouds = 0;", shown)
+            browser.wait("window.clouds > 2", "no live clouds")
+            before, begin = browser.run("return window.clouds;"), time.monotonic()
+            time.sleep(options.seconds)
+            live = (browser.run("return window.clouds;") - before) / (time.monotonic() - begin)
+            points = browser.run("return view.ply.count;")
+            print(f"live dense {what} of {points} points a second: {live:.1f}; slsd-web has {resident_mib(web.process.pid):.0f} MiB")
 
 
 def watch(web, ends, density):
