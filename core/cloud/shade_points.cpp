@@ -46,7 +46,17 @@ Sample sample(const GreyView& image, const CloudPoint& point) {
 }
 
 ColourSample sample(const ColourFrame& colours, const CloudPoint& point) {
-  const Between between(colours.width(), colours.height(), point.camera_u, point.camera_v);
+  return sample_colours(colours, point.camera_u, point.camera_v);
+}
+
+std::uint8_t intensity(double share) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(255 * share, 0.0, 255.0)));
+}
+
+}  // namespace
+
+ColourSample sample_colours(const ColourFrame& colours, double u, double v) {
+  const Between between(colours.width(), colours.height(), u, v);
   ColourSample sample;
   for (std::size_t i = 0; i < sample.levels.size(); ++i) {
     const double a = colours.at(between.left, between.top)[i], b = colours.at(between.right, between.top)[i];
@@ -56,12 +66,6 @@ ColourSample sample(const ColourFrame& colours, const CloudPoint& point) {
   }
   return sample;
 }
-
-std::uint8_t intensity(double share) {
-  return static_cast<std::uint8_t>(std::lround(std::clamp(255 * share, 0.0, 255.0)));
-}
-
-}  // namespace
 
 Rgb colour_of(const ColourSample& white, const ColourSample& dark, const SceneLight& light, bool& saturated) {
   if (white.highest >= kSaturatedShare * light.colour_full) return saturated = true, grey_of(255);

@@ -18,8 +18,8 @@ inline constexpr double kSaturatedShare = 0.985;
 
 /// Frames of a camera without the pattern, with the size and depth of its other frames.
 struct SceneLight {
-  std::optional<GreyView> white;               ///< while the projector showed white
-  std::optional<GreyView> dark;                ///< while it showed black: the light of the room alone
+  std::optional<GreyView> white = {};          ///< while the projector showed white
+  std::optional<GreyView> dark = {};           ///< while it showed black: the light of the room alone
   double full = 255;                           ///< the level of a saturated pixel
   const ColourFrame* white_colours = nullptr;  ///< colours of the white frame; null: the camera sees none
   const ColourFrame* dark_colours = nullptr;
@@ -32,6 +32,9 @@ struct ColourSample {
   std::array<double, 3> levels{};
   double highest = 0;  ///< of all levels that these come from
 };
+
+/// The levels at a place between four pixels.
+[[nodiscard]] ColourSample sample_colours(const ColourFrame& colours, double u, double v);
 
 /// The colour of a surface from its levels under white, minus those of the dark frame, times the gains, 0 to 255.
 /// White if a level is saturated: then the colour is unknown.
