@@ -157,6 +157,8 @@ std::string scan_line(const json& scan) {
                   text_of(scan, "scan"), scan.value("points", 0), regions, scan.value("capture_ms", 0.0),
                   scan.value("decode_ms", 0.0), scan.value("latency_ms", 0.0));
   if (scan.contains("saturated")) line += fmt::format(", {} saturated", scan.value("saturated", 0));
+  if (scan.contains("unseen"))
+    line += fmt::format(", {} of unknown colour: no texture camera sees them", scan.value("unseen", 0));
   const json balances = scan.value("white_balance", json::object());
   for (const auto& [camera, factors] : balances.items())
     line += fmt::format("\ncamera {}: white_balance = {} would make the mean grey", printable(camera), factors.dump());

@@ -30,10 +30,10 @@ std::string csv_field(const std::string& text) {
 }
 
 /// Lists every region that gave no point: its place, and the rules that explain it.
-std::string reasons_csv(const ScanResult& scan, const std::vector<std::string>& cameras) {
+std::string reasons_csv(const ScanResult& scan, const KeptSettings& settings) {
   std::string text = "camera,u,v,status,rule,guard\n";
   for (const RegionReason& reason : scan.reasons) {
-    text += fmt::format("{},{:.2f},{:.2f},{},{},{}\n", csv_field(cameras[reason.camera]), reason.camera_u,
+    text += fmt::format("{},{:.2f},{:.2f},{},{},{}\n", csv_field(settings.camera_name(reason.camera)), reason.camera_u,
                         reason.camera_v, to_string(text_of(reason.rule).gives), to_string(reason.rule),
                         reason.guard ? to_string(*reason.guard) : "");
   }
@@ -76,7 +76,7 @@ class RecordingPart {
         line["cloud"] = "clouds/" + numbered(framed_, ".ply");
         put(line["cloud"], write_ply(scan.outcome->value().cloud));
         line["reasons"] = "reasons/" + numbered(framed_, ".csv");
-        put(line["reasons"], reasons_csv(scan.outcome->value(), settings_.camera_names));
+        put(line["reasons"], reasons_csv(scan.outcome->value(), settings_));
       }
       ++framed_;
     }

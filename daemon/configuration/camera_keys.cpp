@@ -25,6 +25,8 @@ constexpr std::array kMosaics{std::pair("none"sv, BayerPattern::kNone), std::pai
                               std::pair("BGGR"sv, BayerPattern::kBggr), std::pair("GRBG"sv, BayerPattern::kGrbg),
                               std::pair("GBRG"sv, BayerPattern::kGbrg)};
 
+constexpr std::array kUses{std::pair("points"sv, CameraUse::kPoints), std::pair("texture"sv, CameraUse::kTexture)};
+
 using OfDriver = decltype(CameraOptions::of_driver);
 
 /// The drivers, each with its defaults.
@@ -141,6 +143,7 @@ void read_keys(TableReader& reader, CameraOptions& options) {
   reader.choose("driver", options.of_driver, of_drivers);
   std::visit([&](auto& of_driver) { of_driver.name = name; }, options.of_driver);
   read_driver_keys(reader, options.of_driver);
+  reader.choose("use", options.use, kUses);
   read_exposures(reader, options);
   read_white_balance(reader, options);
   read_faults(reader, options);
@@ -170,6 +173,13 @@ Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::ta
     }
     cameras.push_back(std::move(*camera));
   }
+  if (!cameras.empty() && std::ranges::none_of(cameras, &CameraOptions::measures)) {
+    return fail(ErrorCode::kInvalidArgument,
+                "[[camera]] use = \"texture\" gives colours to the points of another camera: add one that measures "
+                "them, or leave the key out",
+                place_of(tables.front()->get("use")->source(), file.string()));
+  }
+  std::ranges::stable_partition(cameras, &CameraOptions::measures);
   return cameras;
 }
 

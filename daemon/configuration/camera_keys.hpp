@@ -11,10 +11,10 @@
 
 namespace slsd {
 
-/// Reads the [[camera]] tables.
+/// Reads the [[camera]] tables. Cameras that measure points come first, then those for colour alone.
 /// @param file  for error places and relative paths
-/// @errors kInvalidArgument: a key that is unknown, of another driver, of the wrong type or out of range; or a repeated
-///         name
+/// @errors kInvalidArgument: a key that is unknown, of another driver, of the wrong type or out of range; a repeated
+///         name; or no camera that measures points
 /// @thread reentrant
 [[nodiscard]] Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::table*>& tables,
                                                               const std::filesystem::path& file);

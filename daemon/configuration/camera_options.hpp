@@ -25,6 +25,12 @@ struct Overloaded : Visits... {
 template <class... Visits>
 Overloaded(Visits...) -> Overloaded<Visits...>;
 
+/// The purpose of a camera.
+enum class CameraUse {
+  kPoints,   ///< it is decoded, and may give colours, too
+  kTexture,  ///< it gives only the colours of points that others measure
+};
+
 /// A [[camera]] table: the keys of its driver, and the keys common to all drivers.
 struct CameraOptions {
   std::variant<FileCameraOptions, V4l2CameraOptions, AravisCameraOptions> of_driver;
@@ -33,6 +39,7 @@ struct CameraOptions {
   std::vector<double> exposures_us = {};
   /// Factors of the colours of clouds.
   ColourGains white_balance = {1, 1, 1};
+  CameraUse use = CameraUse::kPoints;
 
   [[nodiscard]] const std::string& name() const;
   [[nodiscard]] std::string_view driver() const;  ///< "file", "v4l2" or "aravis"
@@ -45,6 +52,7 @@ struct CameraOptions {
   [[nodiscard]] std::string format() const;
   /// Tells whether the frames come from files: then no device is needed.
   [[nodiscard]] bool replays() const { return std::holds_alternative<FileCameraOptions>(of_driver); }
+  [[nodiscard]] bool measures() const { return use == CameraUse::kPoints; }
   /// @errors kInvalidArgument: the message begins with the key
   [[nodiscard]] Result<> validate() const;
   friend bool operator==(const CameraOptions&, const CameraOptions&) = default;

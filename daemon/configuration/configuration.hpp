@@ -33,7 +33,7 @@ struct Configuration {
   std::filesystem::path pattern_file;  ///< replaces `pattern` unless it is empty
   PatternOptions pattern;              ///< includes the projector's size and the named symbols
   ProjectorOptions projector;
-  std::vector<CameraOptions> cameras;
+  std::vector<CameraOptions> cameras;      ///< those that measure points first
   std::filesystem::path calibration_file;  ///< empty: none, and no scan is possible
   OtherHardware other_hardware = OtherHardware::kError;
   DecodeOptions decode;

@@ -35,6 +35,8 @@ tl::unexpected<Error> refuse_exposures(std::string_view why) {
 Result<> check_exposures(const CameraOptions& camera) {
   const std::vector<double>& exposures_us = camera.exposures_us;
   if (exposures_us.empty()) return {};
+  if (!camera.measures())
+    return refuse_exposures("is for cameras that measure points: with use = \"texture\", set exposure_us");
   if (exposures_us.size() != 2) return refuse_exposures("must be two exposures, as in [2000, 8000]");
   const double shorter = exposures_us[0], longer = exposures_us[1];
   if (!(shorter >= 1 && longer <= 1e6)) return refuse_exposures("must be 1 to 1000000");

@@ -31,9 +31,16 @@ ScanResult without_pictures(ScanResult& result) {
   auto frames = std::exchange(result.frames, {});
   auto picture = std::exchange(result.picture_png, {});
   ScanResult kept = result;
+  kept.cloud.coloured = false;  // the kept frames are grey, and a replay gives the same file
   result.dense = std::move(dense), result.files = std::move(files);
   result.frames = std::move(frames), result.picture_png = std::move(picture);
   return kept;
+}
+
+// What belongs to the cameras that measure.
+std::vector<std::string> measuring(std::vector<std::string> of_cameras, const ScanSetup& setup) {
+  of_cameras.resize(std::min(of_cameras.size(), setup.measuring_cameras()));
+  return of_cameras;
 }
 
 bool same_failure(const KeptScan& scan, const Error& error) {
@@ -77,9 +84,9 @@ BlackBox::Entry& BlackBox::find_or_begin(const std::string& id, const SharedSetu
 std::shared_ptr<const KeptSettings> BlackBox::settings_of(const SharedSetup& setup) {
   if (settings_ && setup_.lock() == setup) return settings_;
   setup_ = setup;
-  settings_ = std::make_shared<const KeptSettings>(KeptSettings{setup->pattern, setup->calibration, setup->decode,
-                                                                setup->camera_names, setup->camera_formats,
-                                                                setup->cloud, setup->hand_eye});
+  settings_ = std::make_shared<const KeptSettings>(
+      KeptSettings{setup->pattern, setup->calibration, setup->decode, measuring(setup->camera_names, *setup),
+                   measuring(setup->camera_formats, *setup), setup->cloud, setup->hand_eye});
   return settings_;
 }
 
@@ -106,7 +113,7 @@ void BlackBox::keep_frames(const std::string& id, const FrameSet& set, const Sha
                            const ScanRequest& request) {
   std::size_t needed = 0;
   for (const auto* frames : {&set.frames, &set.white, &set.dark}) {
-    for (const Frame& frame : *frames) needed += bytes_of(frame);
+    for (std::size_t i = 0; i < std::min(frames->size(), set.frames.size()); ++i) needed += bytes_of((*frames)[i]);
   }
   std::vector<std::string> memory;
   {
@@ -124,7 +131,7 @@ void BlackBox::keep_frames(const std::string& id, const FrameSet& set, const Sha
   // Copied without the lock, so that nobody waits for it.
   auto kept = std::make_shared<KeptFrames>();
   const auto keep = [&](const std::vector<Frame>& frames, Picture light) {
-    for (std::size_t i = 0; i < frames.size(); ++i) {
+    for (std::size_t i = 0; i < std::min(frames.size(), set.frames.size()); ++i) {
       const auto fits = std::ranges::find(memory, bytes_of(frames[i]), &std::string::size);
       FrameImage& image = kept->emplace_back();
       if (fits != memory.end()) image.bytes = std::exchange(*fits, {});

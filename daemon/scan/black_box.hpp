@@ -27,13 +27,20 @@ struct KeptSettings {
   Pattern pattern;
   std::optional<Calibration> calibration;
   DecodeOptions decode;
-  std::vector<std::string> camera_names;
+  std::vector<std::string> camera_names;  ///< of the cameras that measure
   std::vector<std::string> camera_formats;
   CloudOptions cloud;  ///< the part of scans that ask for none
   std::optional<HandEyeCalibration> hand_eye;
+
+  /// The configured name of a camera of the calibration.
+  [[nodiscard]] const std::string& camera_name(std::size_t in_calibration) const {
+    const bool by_name = calibration && calibration->cameras.size() > 1;  // a single one matches any name
+    return by_name ? calibration->cameras[in_calibration].name : camera_names.front();
+  }
 };
 
-/// The frames of a kept scan as raw pixels: first the pattern, then white, then dark.
+/// The frames of a kept scan as raw pixels: first the pattern, then white, then dark. None of texture cameras: a replay
+/// has no colours.
 using KeptFrames = std::vector<FrameImage>;
 
 // Shared below: a bundle may still be writing a scan that the box has dropped.
@@ -48,7 +55,7 @@ struct KeptScan {
   Density density = Density::kSymbols;                ///< density of the requested cloud
   CloudOptions part = {};                             ///< the part of the scene that the cloud shows
   std::optional<RigidTransform> base_from_rig = {};   ///< if the part is in the robot's base, and this is known
-  std::shared_ptr<const Result<ScanResult>> outcome;  ///< null until decoded; no pictures or dense points
+  std::shared_ptr<const Result<ScanResult>> outcome;  ///< null until decoded; no pictures, colours or dense points
   std::uint64_t times = 1;                            ///< number of successive failures like this one without frames
 };
 

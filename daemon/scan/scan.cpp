@@ -65,7 +65,7 @@ void Scan::expose(Rig& rig, HardwareGuard& hardware, SharedSetup setup, const Wa
     set_ = tl::unexpected(possible.error());
     return;
   }
-  set_ = rig.capture(limit, exposure, {request_.texture, request_.ambient});
+  set_ = rig.capture(limit, exposure, {request_.texture, request_.ambient, request_.colour});
   if (!set_) set_ = tl::unexpected(after_tries(set_.error(), lost_));
   if (!set_) return;
   if (auto same = hardware.check(setup_, rig); !same) set_ = tl::unexpected(same.error());

@@ -206,6 +206,7 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
                                 const Configuration& configuration, std::size_t lanes, const ScanSetup* earlier) {
   ScanSetup setup{std::move(pattern), {}, std::move(calibration), {}, {}, configuration.other_hardware};
   for (const CameraOptions& camera : configuration.cameras) {
+    setup.texture_cameras += camera.measures() ? 0 : 1;
     setup.camera_names.push_back(camera.name());
     setup.camera_formats.push_back(camera.format());
     setup.colour_gains.push_back(camera.white_balance);
@@ -216,8 +217,9 @@ Result<ScanSetup> ScanSetup::of(Pattern pattern, std::optional<Calibration> cali
   setup.depth_min_mm = configuration.decode.depth_min_mm;
   setup.depth_max_mm = configuration.decode.depth_max_mm;
   if (!setup.calibration) return setup;
-  const auto cameras = calibrated_cameras(*setup.calibration, configuration);
+  auto cameras = calibrated_cameras(*setup.calibration, configuration);
   if (!cameras) return tl::unexpected(cameras.error());
+  cameras->resize(setup.measuring_cameras());
   setup.doubts = calibration_doubts(*setup.calibration, {setup.depth_min_mm, setup.depth_max_mm});
   auto first = make_lane(setup, *cameras, configuration.decode, earlier);
   if (!first) return tl::unexpected(first.error());
@@ -239,7 +241,14 @@ Result<> ScanSetup::check(const ScanRequest& request) const {
     return fail(ErrorCode::kNotFound, "no calibration: calibrate, or set [calibration] file in the configuration");
   }
   if (auto part = part_of(request); !part) return tl::unexpected(part.error());
-  return check_camera(request.camera);
+  if (auto known = check_camera(request.camera); !known) return known;
+  if (camera_index(request.camera) < measuring_cameras()) return {};
+  return fail(
+      ErrorCode::kInvalidArgument,
+      "camera \"" + printable(request.camera, 64) +
+          "\" serves for colour alone (use = \"texture\"), and decodes no picture: name another, or ask for its "
+          "frame",
+      "camera");
 }
 
 Result<> ScanSetup::check_robot_base() const {

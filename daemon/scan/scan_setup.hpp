@@ -90,8 +90,8 @@ struct ScanSetup {
   Pattern pattern;
   Grey8 image;  ///< the projector's picture of the pattern
   std::optional<Calibration> calibration;
-  std::vector<std::string> camera_names;    ///< names of the configured cameras
-  std::vector<std::vector<Decoder>> lanes;  ///< by decoding thread, then by configured camera; none without calibration
+  std::vector<std::string> camera_names;    ///< names of the configured cameras; those of texture cameras last
+  std::vector<std::vector<Decoder>> lanes;  ///< by decoding thread, then by measuring camera; none without calibration
   OtherHardware other_hardware = OtherHardware::kError;
   std::vector<ColourGains> colour_gains = {};    ///< of the configured cameras; none: 1
   std::vector<std::string> camera_formats = {};  ///< configured formats, such as "Mono12"; an empty text if not set
@@ -105,6 +105,7 @@ struct ScanSetup {
   double depth_min_mm = DecodeOptions{}.depth_min_mm;  ///< nearest depth of the scene along the cameras' axes
   double depth_max_mm = DecodeOptions{}.depth_max_mm;
   std::optional<HandEyeCalibration> hand_eye = {};
+  std::size_t texture_cameras = 0;  ///< how many of the cameras serve for colour alone
 
   /// @param lanes    number of decoding threads
   /// @param earlier  makes this one sooner if the pattern's symbols and the calibration stay; may be at work, or null
@@ -118,7 +119,7 @@ struct ScanSetup {
                                             const ScanSetup* earlier = nullptr);
 
   /// Checks that a scan is possible. @errors kNotFound: no calibration, or no camera of this name;
-  ///         errors of part_of()
+  ///         kInvalidArgument: a texture camera, which gives no picture of points; errors of part_of()
   [[nodiscard]] Result<> check(const ScanRequest& request) const;
   /// Checks that clouds can be in the robot's base. @errors kNotFound: no hand-eye calibration; kMismatch: it was
   /// measured with another calibration of the scanner
@@ -131,6 +132,8 @@ struct ScanSetup {
   /// @errors of check_robot_base(); kInvalidArgument: a box that no camera sees, or in the robot's base without its
   /// pose
   [[nodiscard]] Result<CloudPart> part_of(const ScanRequest& request) const;
+  /// Number of the first cameras that measure points.
+  [[nodiscard]] std::size_t measuring_cameras() const { return camera_names.size() - texture_cameras; }
   /// @errors kNotFound: no camera of this name
   [[nodiscard]] Result<> check_camera(const std::string& name) const;
   /// @param name  of a camera; empty: the first

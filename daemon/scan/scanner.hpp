@@ -95,7 +95,8 @@ class Scanner {
   [[nodiscard]] ScanTotals totals() const { return statistics_.totals(); }
   /// Records the time from the last byte of a scan's frames to its cloud at a client's socket.
   void note_latency(std::chrono::nanoseconds time) { statistics_.note_latency(time); }
-  /// The drift of the calibration according to the scans, one for each configured camera; empty before the first scan.
+  /// The drift of the calibration according to the scans, one for each camera that measures; empty before the first
+  /// scan.
   [[nodiscard]] std::vector<DriftState> drifts() const { return watch_.states(); }
   [[nodiscard]] const BlackBox& black_box() const { return black_box_; }  ///< metrics read its figures
   [[nodiscard]] const Rig& rig() const { return *rig_; }                  ///< clients read its statuses

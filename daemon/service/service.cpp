@@ -78,7 +78,9 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   if (!projector) return tl::unexpected(projector.error());
   std::vector<std::unique_ptr<Camera>> cameras;
   std::vector<std::vector<double>> exposures_us;
+  std::size_t texture_cameras = 0;
   for (const CameraOptions& options : configuration.cameras) {
+    texture_cameras += options.measures() ? 0 : 1;
     auto camera = make_camera(options);
     if (!camera) return tl::unexpected(camera.error());
     cameras.push_back(std::move(*camera));
@@ -92,8 +94,8 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   for (const std::string& doubt : setup->doubts) spdlog::warn("{}", doubt);
   if (configuration.decode.density == Density::kPixels && setup->calibration)
     for (const std::string& warning : calibration_error_warnings(*setup->calibration)) spdlog::warn("{}", warning);
-  auto rig =
-      std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan, exposures_us);
+  auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan,
+                                   exposures_us, texture_cameras);
   rig->set_idle(draw_idle(configuration.projector), std::chrono::milliseconds(configuration.projector.idle_after_ms));
   std::error_code ignored;
   const auto known_from_anywhere = std::filesystem::absolute(file, ignored);

@@ -13,6 +13,8 @@ ConfigurationTable every_camera() {
       "One table per camera. Without one the service runs, but cannot scan.",
       {{{{"name", R"("camera")"}}, "The calibration's name for it. Each camera has its own."},
        {{{"driver", R"("file")"}}, R"("file" replays images. "v4l2" and "aravis" are for devices.)"},
+       {{{"use", R"("points")"}},
+        R"("points": the camera is decoded. "texture": it gives only the colours of points that other cameras measure.)"},
        {{{"exposures_us", "[2000, 8000]", kOptional}},
         "Two exposures of each picture, 1 to 1000000, the shorter first. slsd merges the frames: for still scenes with "
         "bright and dark parts. The longer one is 1.5 to 100 times as long. Replaces exposure_us. A camera of files "

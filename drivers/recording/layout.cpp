@@ -36,6 +36,7 @@ std::string camera_table(const RecordedCamera& camera) {
 std::vector<RecordedCamera> recorded_cameras(const json& settings) {
   std::vector<RecordedCamera> cameras;
   for (const json& camera : settings.value("cameras", json::array())) {
+    if (camera.value("use", "") == "texture") continue;  // it has no frame of the pattern
     const std::string name = camera.value("name", "");
     std::string folder = name;
     std::ranges::replace_if(

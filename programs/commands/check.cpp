@@ -293,7 +293,7 @@ class Check {
     findings_.good(name + " opens");
     const CameraDescription& seen = (*camera)->description();
     check_calibrated(name, options, seen.hardware, seen.width_px, seen.height_px);
-    if (options.replays()) check_symbols(name, options, **camera);
+    if (options.replays() && options.measures()) check_symbols(name, options, **camera);
   }
 
   void check_light(const std::string& name, const CameraOptions& options, const GreyView& frame) {
@@ -445,7 +445,7 @@ class Check {
     double scan_bytes = 0;
     for (const CameraOptions& camera : configuration_.cameras) {
       const CalibratedCamera* const known = calibration_ ? calibration_->camera(camera.name()) : nullptr;
-      if (known != nullptr) scan_bytes += 2.0 * known->lens.width_px * known->lens.height_px;
+      if (known != nullptr && camera.measures()) scan_bytes += 2.0 * known->lens.width_px * known->lens.height_px;
     }
     const double scans = scan_bytes > 0 ? static_cast<double>(options.memory_max_bytes()) / scan_bytes : 0;
     const std::string memory = fmt::format("black box: {} MB of memory", options.memory_max_mb);

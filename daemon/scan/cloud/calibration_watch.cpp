@@ -32,7 +32,8 @@ void CalibrationWatch::begin(const SharedSetup& setup) {
   setup_ = setup;
   cameras_.clear();
   const Calibration& calibration = *setup->calibration;
-  for (const std::string& name : setup->camera_names) {
+  for (std::size_t i = 0; i < setup->measuring_cameras(); ++i) {
+    const std::string& name = setup->camera_names[i];
     const CalibratedCamera* const camera = calibration.camera(name);
     if (camera == nullptr) continue;
     cameras_.push_back({name, static_cast<std::uint8_t>(camera - calibration.cameras.data()),

@@ -11,10 +11,11 @@
 #include "core/cloud/shade_points.hpp"
 #include "core/decode/decoder.hpp"
 #include "core/exposure/frame_noise.hpp"
-#include "core/exposure/merge_exposures.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/scan/cloud/frame_image.hpp"
+#include "daemon/scan/cloud/seen_light.hpp"
+#include "daemon/scan/cloud/texture_cameras.hpp"
 
 namespace slsd {
 namespace {
@@ -68,67 +69,11 @@ Result<> keep_frames(const FrameSet& set, const ScanSetup& setup, FrameCoding co
   return kept;
 }
 
-// The saturation level of a camera, for all its frames.
-double full_level_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera) {
-  if (set.is_merged(camera)) return kMergedFull;
-  std::vector<GreyView> all;
-  for (const auto* frames : {&set.frames, &set.white, &set.dark}) {
-    if (!frames->empty()) all.push_back((*frames)[camera].image());
-  }
-  return setup.full_level_of(camera, all);
-}
-
-/// The light of the scene as one camera sees it, with the colours that it refers to.
-struct SeenLight {
-  SceneLight light;
-  ColourFrame white, dark;
-};
-
-Result<> add_colours(const FrameSet& set, const ScanSetup& setup, std::size_t camera, SeenLight& seen) {
-  const auto read = [camera](const std::vector<Frame>& frames, ColourFrame& colours) -> Result<> {
-    if (frames.empty()) return {};
-    auto converted = frames[camera].colours();
-    if (!converted) return tl::unexpected(std::move(converted.error()));
-    colours = std::move(*converted);
-    if (colours.empty() || size_of(frames[camera].image()) == std::pair(colours.width(), colours.height())) return {};
-    return fail(ErrorCode::kMismatch, "the colours of a frame have another size than the frame: scan again");
-  };
-  auto added = read(set.white, seen.white);
-  if (added) added = read(set.dark, seen.dark);
-  if (!added && added.error().where.empty()) added.error().where = "camera " + setup.camera_names[camera];
-  if (!added || seen.white.empty()) return added;
-  seen.light.white_colours = &seen.white;
-  if (!seen.dark.empty()) seen.light.dark_colours = &seen.dark;
-  if (camera < setup.colour_gains.size()) seen.light.gains = setup.colour_gains[camera];
-  seen.light.colour_full = set.is_merged(camera) ? setup.full_level_of(camera, {}) : seen.light.full;
-  return added;
-}
-
-// The light of one camera's frames. The object must not move, because the light refers to its colours.
-Result<> light_of(const FrameSet& set, const ScanSetup& setup, std::size_t camera, bool coloured, SeenLight& seen) {
-  if (!set.white.empty()) seen.light.white = set.white[camera].image();
-  if (!set.dark.empty()) seen.light.dark = set.dark[camera].image();
-  seen.light.full = full_level_of(set, setup, camera);
-  return coloured ? add_colours(set, setup, camera, seen) : Result<>();
-}
-
 // Measures the light of one camera's points.
 void shade(std::span<CloudPoint> points, const SceneLight& light, ScanResult& result) {
   if (!light.white && !light.dark) return;
   const std::size_t saturated = shade_points(points, light);
   if (light.white) result.saturated = result.saturated.value_or(0) + saturated;
-}
-
-/// The factors that make the mean colour of these points grey. Empty: the mean lacks a colour. Saturated points are
-/// left out.
-std::optional<ColourGains> white_balance_of(std::span<const CloudPoint> points, const ColourGains& applied) {
-  ColourGains sums{};
-  for (const CloudPoint& point : points) {
-    if (std::ranges::max(point.colour) == 255) continue;
-    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += point.colour[i] / applied[i];
-  }
-  if (std::ranges::any_of(sums, [](double sum) { return sum <= 0; })) return std::nullopt;
-  return ColourGains{sums[1] / sums[0], 1, sums[1] / sums[2]};
 }
 
 /// Limits the next frame to the pixels that can see the box, if there is one.
@@ -143,25 +88,51 @@ void limit_to_box(const CloudPart& part, const ScanSetup& setup, Decoder& decode
   decoder.set_part(mapper != nullptr ? mapper->part_of_symbols() : pixels);
 }
 
+/// A camera's frame under the pattern, and what decodes it.
+struct CameraFrame {
+  GreyView image;
+  Decoder& decoder;
+  DenseMapper* mapper;  ///< null without a dense cloud
+  std::size_t camera;   ///< index in the setup
+  const SceneLight& light;
+};
+
 /// A point for each pixel of a camera, from the symbols of its frame.
-DenseView measure_pixels(const GreyView& frame, Decoder& decoder, DenseMapper& mapper, ScanSetup& setup,
-                         std::size_t camera, const SceneLight& light, const ScanRequest& request, ScanResult& result) {
+DenseView measure_pixels(const CameraFrame& frame, ScanSetup& setup, const ScanRequest& request, ScanResult& result) {
+  const auto& [image, decoder, mapper, camera, light] = frame;
   DecodedSymbols symbols = decoder.symbols();
-  if (light.white) symbols.noise = measure_noise(frame, light.full);  // the symbols may come from the quotient image
-  if (DenseMap& map = mapper.map(); map.pixels.empty()) map = setup.dense->spare_map();
-  DenseMap& map = request.of_stream ? mapper.measure_next(frame, light.full, symbols, *setup.crew)
-                                    : mapper.measure(frame, light.full, symbols, *setup.crew);
+  if (light.white) symbols.noise = measure_noise(image, light.full);  // the symbols may come from the quotient image
+  if (DenseMap& map = mapper->map(); map.pixels.empty()) map = setup.dense->spare_map();
+  DenseMap& map = request.of_stream ? mapper->measure_next(image, light.full, symbols, *setup.crew)
+                                    : mapper->measure(image, light.full, symbols, *setup.crew);
   DenseView view{std::exchange(map, {}),
-                 mapper.rays(),
+                 mapper->rays(),
                  setup.calibration->cameras[decoder.camera_index()].rig_from_camera,
                  decoder.camera_index(),
                  setup.camera_names[camera],
-                 mapper.epipolar_offset_px()};
+                 mapper->epipolar_offset_px()};
   if (light.white || light.dark) {
     const std::size_t saturated = shade_view(view, light, request.colour);
     if (light.white) result.dense_saturated = result.dense_saturated.value_or(0) + saturated;
   }
   return view;
+}
+
+/// Adds the surface outside the box, too: it may hide the box from a texture camera. The cloud itself stays the same as
+/// without colours.
+Result<> add_whole_surface(const CameraFrame& frame, ScanSetup& setup, const ScanRequest& request,
+                           TextureCameras& textures) {
+  limit_to_box({}, setup, frame.decoder, frame.mapper);
+  const auto decoding = decode_in_light(frame.decoder, frame.image, frame.light, nullptr, setup.crew.get());
+  if (!decoding)
+    return fail(decoding.error().code, decoding.error().message, "camera " + setup.camera_names[frame.camera]);
+  const std::vector<CloudPoint> points((*decoding)->points.begin(), (*decoding)->points.end());
+  ScanResult ignored;
+  std::optional<DenseView> pixels;
+  if (frame.mapper != nullptr) pixels = measure_pixels(frame, setup, request, ignored);
+  textures.add(setup, frame.decoder.camera_index(), points, pixels ? &*pixels : nullptr);
+  if (pixels) frame.mapper->map() = std::move(pixels->map);
+  return {};
 }
 
 // Waits for half of the time left. A stream does not wait: its next cloud carries the answer.
@@ -187,18 +158,26 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   if (!wanted) return tl::unexpected(wanted.error());
   const CloudPart& part = *wanted;
   auto dense = request.formats.dense() ? setup.dense->cloud() : nullptr;
-  bool sees_colours = false;
+  auto textures = request.colour ? TextureCameras::of(set, setup) : TextureCameras();
+  if (!textures) return tl::unexpected(std::move(textures.error()));
+  const bool own_colours = request.colour && textures->empty();
+  bool sees_colours = !textures->empty();
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     clock.start();
     const auto begin = steady_clock::now();
     Decoder& decoder = setup.lanes[lane][i];
     SeenLight seen;
-    if (auto lit = light_of(set, setup, i, request.colour, seen); !lit) return tl::unexpected(std::move(lit.error()));
+    if (auto lit = read_light(set, setup, i, own_colours, seen); !lit) return tl::unexpected(std::move(lit.error()));
     const SceneLight& light = seen.light;
     sees_colours = sees_colours || light.white_colours != nullptr;
     result.full_levels.push_back(light.full);
     DenseMapper* mapper =
         dense ? &setup.dense->of(lane, i, decoder, setup.pattern, *setup.calibration, setup.decode) : nullptr;
+    const CameraFrame frame{set.frames[i].image(), decoder, mapper, i, light};
+    if (part.box && !textures->empty()) {
+      if (auto added = add_whole_surface(frame, setup, request, *textures); !added)
+        return tl::unexpected(added.error());
+    }
     limit_to_box(part, setup, decoder, mapper);
     const auto decoding = decode_in_light(decoder, set.frames[i].image(), light, &clock, setup.crew.get());
     result.decode_time += steady_clock::now() - begin;
@@ -217,10 +196,13 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
         result.white_balance.push_back({setup.camera_names[i], *balance});
     if (dense) {
       const auto dense_begin = steady_clock::now();
-      dense->views.push_back(measure_pixels(set.frames[i].image(), decoder, *mapper, setup, i, light, request, result));
+      dense->views.push_back(measure_pixels(frame, setup, request, result));
       const auto took = steady_clock::now() - dense_begin;
       result.dense_time += took, result.decode_time += took;
     }
+    const auto surfaces_begin = steady_clock::now();
+    if (!part.box) textures->add(setup, decoder.camera_index(), points, dense ? &dense->views.back() : nullptr);
+    result.decode_time += steady_clock::now() - surfaces_begin;
     if (!request.picture || i != pictured) continue;
     const auto look = request.why ? DecodingLook::kReasons : DecodingLook::kSymbols;
     auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern, look);
@@ -235,6 +217,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   if (dense) {
     const auto dense_begin = steady_clock::now();
     keep_part(dense->views, part);
+    textures->paint(dense->views, *setup.crew, result);
     const auto took = steady_clock::now() - dense_begin;
     result.dense_time += took, result.decode_time += took;
     dense->scan_id = result.cloud.scan_id, dense->time = result.cloud.time, dense->frame = result.cloud.frame;
@@ -252,6 +235,9 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   }
   const std::size_t decoded = result.cloud.points.size();
   keep_part(result.cloud.points, part);
+  const auto paint_begin = steady_clock::now();
+  textures->paint(result);
+  result.decode_time += steady_clock::now() - paint_begin;
   if (decoded > 0 && result.cloud.points.empty())
     result.empty = "none of the " + std::to_string(decoded) + " points lies " +
                    (part.box ? "within the box: make it larger, or move it" : "before the plane: move it, or turn it");

@@ -132,9 +132,11 @@ struct ScanResult {
   std::vector<RegionReason> reasons = {};             ///< one for each region that gave no point, of all cameras
   std::optional<std::uint64_t> saturated;             ///< if requested: points that white was too bright for
   std::optional<std::uint64_t> dense_saturated = {};  ///< the same for the points of pixels
-  std::chrono::system_clock::time_point exposed{};    ///< when the exposure began, as `cloud.time`
-  MonotonicTime received;                             ///< time when the last byte of the frames arrived
-  std::chrono::nanoseconds skew{};                    ///< time between the first and the last camera's exposure
+  std::optional<std::uint64_t> unseen = {};           ///< with texture cameras: points that none of them sees
+  std::optional<std::uint64_t> dense_unseen = {};
+  std::chrono::system_clock::time_point exposed{};  ///< when the exposure began, as `cloud.time`
+  MonotonicTime received;                           ///< time when the last byte of the frames arrived
+  std::chrono::nanoseconds skew{};                  ///< time between the first and the last camera's exposure
   std::uint64_t skipped = 0;  ///< sets of frames since the previous scan that were skipped for newer ones
   std::chrono::nanoseconds capture_time{};
   std::chrono::nanoseconds decode_time{};

@@ -15,8 +15,9 @@ namespace slsd {
 
 /// The frames that a scan takes besides those of the pattern.
 struct LightFrames {
-  bool white = false;  ///< a frame under the projector's white
-  bool dark = false;   ///< a frame under the projector's black
+  bool white = false;   ///< a frame under the projector's white
+  bool dark = false;    ///< a frame under the projector's black
+  bool colour = false;  ///< these frames of the texture cameras, too
 };
 
 /// The second, longer exposures of one picture, by camera. None for a camera that takes only one.
@@ -25,8 +26,8 @@ using LongerFrames = std::vector<std::optional<Frame>>;
 /// One frame of each camera, all from one exposure. Also has one per camera under white and under black, if requested.
 /// @thread thread-bound; may be moved between threads
 struct FrameSet {
-  std::vector<Frame> frames;  ///< one per camera, in the order of the cameras; at least one
-  std::vector<Frame> white;   ///< one per camera, or none
+  std::vector<Frame> frames;  ///< one per camera that measures, in the order of the cameras; at least one
+  std::vector<Frame> white;   ///< one per camera, or none; those of texture cameras come last, if they are wanted
   std::vector<Frame> dark;
   LongerFrames longer, longer_white, longer_dark;  ///< as the three above; empty if no camera takes two exposures
   std::vector<double> exposure_ratios;             ///< longer to shorter, by camera; 1 or none with one exposure

@@ -24,11 +24,11 @@ std::string milliseconds_text(std::chrono::nanoseconds time) {
   return text;
 }
 
-auto exposures(const std::vector<Frame>& frames) {
+auto exposures(std::span<const Frame> frames) {
   return std::ranges::minmax_element(frames, {}, &Frame::exposure_start);
 }
 
-std::chrono::nanoseconds skew_of(const std::vector<Frame>& frames) {
+std::chrono::nanoseconds skew_of(std::span<const Frame> frames) {
   const auto [first, last] = exposures(frames);
   return last->exposure_start() - first->exposure_start();
 }
@@ -44,8 +44,10 @@ Error incomplete(Error error, std::size_t cameras) {
 }  // namespace
 
 Rig::Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, Grey8 image,
-         const ScanOptions& options, const std::vector<std::vector<double>>& exposures_us)
-    : projection_(std::move(projector), std::move(image), options), options_(options) {
+         const ScanOptions& options, const std::vector<std::vector<double>>& exposures_us, std::size_t texture_cameras)
+    : projection_(std::move(projector), std::move(image), options),
+      measuring_(cameras.size() - texture_cameras),
+      options_(options) {
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     auto exposures = i < exposures_us.size() ? exposures_us[i] : std::vector<double>();
     runners_.push_back(std::make_unique<CameraRunner>(std::move(cameras[i]), options, std::move(exposures)));
@@ -150,14 +152,17 @@ Result<std::vector<Frame>> Rig::take_set(Cameras cameras, const Shot& shot) {
   auto frames =
       expose(cameras, {shot.limit, may_have_begun ? shot.exposure : Exposure::kFresh, shot.light, shot.round});
   if (!frames) return frames;
-  if (auto aligned = align(cameras, *frames, shot); !aligned) return tl::unexpected(aligned.error());
-  if (auto together = check_skew(cameras, *frames); !together) return tl::unexpected(together.error());
+  // The scene stands still for a texture camera: it need not expose together with the others.
+  const Cameras together = cameras.first(std::min(cameras.size(), measuring_));
+  const std::span of_these = std::span(*frames).first(together.size());
+  if (auto aligned = align(together, of_these, shot); !aligned) return tl::unexpected(aligned.error());
+  if (auto fit = check_skew(together, of_these); !fit) return tl::unexpected(fit.error());
   return frames;
 }
 
 // A lost frame costs both exposures, so that little time passes between them.
-Result<> Rig::take_picture(const Shot& shot, FrameSet& set) {
-  auto frames = take_set(cameras_, shot);
+Result<> Rig::take_picture(Cameras cameras, const Shot& shot, FrameSet& set) {
+  auto frames = take_set(cameras, shot);
   if (!frames) return tl::unexpected(frames.error());
   const bool pattern = shot.light == Picture::kPattern, white = shot.light == Picture::kWhite;
   LongerFrames& longer = pattern ? set.longer : white ? set.longer_white : set.longer_dark;
@@ -166,7 +171,7 @@ Result<> Rig::take_picture(const Shot& shot, FrameSet& set) {
     auto second = take_set(of_two_exposures_, {shot.limit, Exposure::kFresh, shot.light, 1});
     if (!second) return tl::unexpected(second.error());
     auto next = second->begin();
-    for (const CameraRunner* camera : cameras_)
+    for (const CameraRunner* camera : cameras)
       camera->exposures_us().empty() ? longer.emplace_back() : longer.emplace_back(std::move(*next++));
   }
   (pattern ? set.frames : white ? set.white : set.dark) = std::move(*frames);
@@ -174,7 +179,8 @@ Result<> Rig::take_picture(const Shot& shot, FrameSet& set) {
 }
 
 bool Rig::only_replays() const {
-  return std::ranges::all_of(cameras_, [](const auto& camera) { return camera->replays() && camera->rate_hz() <= 0; });
+  return std::ranges::all_of(measuring(),
+                             [](const auto& camera) { return camera->replays() && camera->rate_hz() <= 0; });
 }
 
 Result<FrameSet> Rig::capture(const WaitLimit& limit, Exposure exposure, LightFrames light) {
@@ -183,13 +189,14 @@ Result<FrameSet> Rig::capture(const WaitLimit& limit, Exposure exposure, LightFr
   for (const Picture now : {Picture::kPattern, Picture::kWhite, Picture::kBlack}) {
     if (now == Picture::kWhite && !light.white) continue;
     if (now == Picture::kBlack && !light.dark) continue;
-    auto taken = take_picture({limit, exposure, now}, set);
+    const Cameras cameras = light.colour && now != Picture::kPattern ? Cameras(cameras_) : measuring();
+    auto taken = take_picture(cameras, {limit, exposure, now}, set);
     while (!taken && limit.again && limit.again(taken.error())) {
-      taken = take_picture({limit, Exposure::kFresh, now}, set);
+      taken = take_picture(cameras, {limit, Exposure::kFresh, now}, set);
     }
     if (!taken) return tl::unexpected(taken.error());
   }
-  for (const CameraRunner* camera : cameras_) {
+  for (const CameraRunner* camera : measuring()) {
     const std::vector<double>& exposures_us = camera->exposures_us();
     if (!of_two_exposures_.empty())
       set.exposure_ratios.push_back(exposures_us.empty() ? 1 : exposures_us.back() / exposures_us.front());
@@ -213,9 +220,9 @@ Result<Frame> Rig::capture_one(std::size_t camera, const WaitLimit& limit, bool 
 
 // Cameras in free run begin at any moment of their period. If one began too early for the others, its next frame is
 // closer to theirs.
-Result<> Rig::align(Cameras cameras, std::vector<Frame>& frames, const Shot& shot) {
+Result<> Rig::align(Cameras cameras, std::span<Frame> frames, const Shot& shot) {
   for (std::size_t tries = 0; frames.size() > 1 && tries < kAlignTriesMax; ++tries) {
-    const auto first = static_cast<std::size_t>(exposures(frames).min - frames.begin());
+    const auto first = static_cast<std::size_t>(&*exposures(frames).min - frames.data());
     if (skew_of(frames) <= slack(*cameras[first])) return {};
     auto next = expose(cameras.subspan(first, 1), {shot.limit, Exposure::kNext, shot.light, shot.round});
     if (!next) return tl::unexpected(next.error());
@@ -245,13 +252,13 @@ Result<> Rig::check_times(Cameras cameras, const std::vector<Frame>& frames, Mon
   return {};
 }
 
-Result<> Rig::check_skew(Cameras cameras, const std::vector<Frame>& frames) const {
+Result<> Rig::check_skew(Cameras cameras, std::span<const Frame> frames) const {
   const auto skew = skew_of(frames);
   if (skew <= std::chrono::milliseconds(options_.exposure_skew_ms)) return {};
   const auto [first, last] = exposures(frames);
-  return fail(ErrorCode::kFrameSkewed, "camera " + cameras[last - frames.begin()]->name() + " exposed " +
+  return fail(ErrorCode::kFrameSkewed, "camera " + cameras[&*last - frames.data()]->name() + " exposed " +
                                            milliseconds_text(skew) + " after camera " +
-                                           cameras[first - frames.begin()]->name() +
+                                           cameras[&*first - frames.data()]->name() +
                                            ", more than [scan] exposure_skew_ms: check the trigger");
 }
 

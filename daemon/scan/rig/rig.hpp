@@ -36,22 +36,25 @@ class Rig {
   /// @param image         the pattern that the projector shows during scans
   /// @param exposures_us  by camera: two exposures, the shorter first, or none for a camera that takes one; may be
   ///                      shorter than the cameras
+  /// @param texture_cameras  how many of the last cameras serve for colour alone
   Rig(std::unique_ptr<Projector> projector, std::vector<std::unique_ptr<Camera>> cameras, Grey8 image,
-      const ScanOptions& options, const std::vector<std::vector<double>>& exposures_us = {});
+      const ScanOptions& options, const std::vector<std::vector<double>>& exposures_us = {},
+      std::size_t texture_cameras = 0);
 
   /// Opens the projector and shows the current picture; notices a lost projector.
   void supervise() { projection_.supervise(); }
   /// The time when supervise() next has work while no device is lost; the end of time if it has none.
   [[nodiscard]] MonotonicTime next_change() const { return projection_.next_change(); }
 
-  /// Tells whether all cameras replay images at the trigger. Then only the processor limits the rate.
+  /// Tells whether all cameras that measure replay images at the trigger. Then only the processor limits the rate.
   [[nodiscard]] bool only_replays() const;
 
   /// Takes one frame of each camera. If cameras run freely, takes the frames with the closest exposures. Takes lost
   /// frames again if the limit allows. Cameras with two exposures then take the longer one together, of each picture.
   /// @param exposure  kNext: a frame may have begun before the call, but after the pattern was visible and after the
   ///                  previous capture's frames
-  /// @param light     exposed after the pattern's frames, white first, each once its own picture is visible
+  /// @param light     exposed after the pattern's frames, white first, each once its own picture is visible. With
+  ///                  colour, texture cameras expose as well; their exposures may lie apart from those of others
   /// @errors kTimeout: a device is not ready; kFrameDropped, kFrameTorn, kFrameStale, kFrameLate, kMismatch,
   ///         kDisconnected, kBusy: of one camera; kFrameSkewed: exposures too far apart; kCancelled
   [[nodiscard]] Result<FrameSet> capture(const WaitLimit& limit, Exposure exposure = Exposure::kFresh,
@@ -102,19 +105,21 @@ class Rig {
   };
   template <class Show>
   [[nodiscard]] Result<> show(const WaitLimit& limit, Show show);
-  [[nodiscard]] Result<> take_picture(const Shot& shot, FrameSet& set);
+  [[nodiscard]] Cameras measuring() const { return Cameras(cameras_).first(measuring_); }
+  [[nodiscard]] Result<> take_picture(Cameras cameras, const Shot& shot, FrameSet& set);
   [[nodiscard]] Result<std::vector<Frame>> take_set(Cameras cameras, const Shot& shot);
   [[nodiscard]] Result<std::vector<Frame>> expose(Cameras cameras, const Shot& shot);
   [[nodiscard]] Result<std::vector<Frame>> collect(Cameras cameras, const WaitLimit& limit);
-  [[nodiscard]] Result<> align(Cameras cameras, std::vector<Frame>& frames, const Shot& shot);
+  [[nodiscard]] Result<> align(Cameras cameras, std::span<Frame> frames, const Shot& shot);
   [[nodiscard]] std::chrono::nanoseconds slack(const CameraRunner& camera) const;
   [[nodiscard]] Result<> check_times(Cameras cameras, const std::vector<Frame>& frames, MonotonicTime since,
                                      MonotonicTime deadline) const;
-  [[nodiscard]] Result<> check_skew(Cameras cameras, const std::vector<Frame>& frames) const;
+  [[nodiscard]] Result<> check_skew(Cameras cameras, std::span<const Frame> frames) const;
 
   Projection projection_;
   std::vector<std::unique_ptr<CameraRunner>> runners_;
   std::vector<CameraRunner*> cameras_;
+  std::size_t measuring_;  ///< number of the first cameras that measure
   std::vector<CameraRunner*> of_two_exposures_;
   ScanOptions options_;
   std::uint64_t changes_before_ = 0;  ///< the projection's count of changes at the last set of frames

@@ -27,6 +27,7 @@ void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
   result["points"] = dense.points();
   result["dense_ms"] = milliseconds(scan.dense_time);
   if (scan.dense_saturated) result["saturated"] = *scan.dense_saturated;
+  if (scan.dense_unseen) result["unseen"] = *scan.dense_unseen;
   json pixels = json::object();
   for (int i = 0; i < kDensePixelCount; ++i) {
     std::uint64_t count = 0;
@@ -100,6 +101,7 @@ json scan_json(const ScanResult& scan, Density density) {
               {"stages_ms", std::move(stages)}};
   if (scan.cloud.sigma_calibration_mm) result["sigma_calibration_mm"] = *scan.cloud.sigma_calibration_mm;
   if (scan.saturated) result["saturated"] = *scan.saturated;
+  if (scan.unseen) result["unseen"] = *scan.unseen;
   if (density == Density::kPixels && scan.dense) {
     add_pixels(*scan.dense, scan, result);
   } else if (!scan.empty.empty()) {

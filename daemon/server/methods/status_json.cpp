@@ -104,6 +104,7 @@ json camera_json(const CameraOptions& camera) {
   if (!camera.exposures_us.empty()) about["exposures_us"] = camera.exposures_us;
   if (const auto gain_db = camera.gain_db()) about["gain_db"] = *gain_db;
   if (!camera.replays()) about["format"] = camera.format();
+  if (!camera.measures()) about["use"] = "texture";
   return about;
 }
 

@@ -69,6 +69,27 @@ TEST(ReadConfiguration, TakesAWhiteBalanceOfThreeFactors) {
     EXPECT_FALSE(with(wrong).has_value()) << wrong;
 }
 
+TEST(ReadConfiguration, PutsTextureCamerasLast) {
+  const auto with = [](const std::string& first, const std::string& second) {
+    return read("[[camera]]\nname = \"a\"\npath = \"x\"\n" + first + "[[camera]]\nname = \"b\"\npath = \"x\"\n" +
+                second + "[[camera]]\nname = \"c\"\npath = \"x\"\n");
+  };
+  const auto names = [](const Result<Configuration>& configuration) {
+    std::string all;
+    for (const CameraOptions& camera : configuration->cameras)
+      all += camera.name() + (camera.measures() ? " " : " texture ");
+    return all;
+  };
+  EXPECT_EQ(names(with("", "")), "a b c ");
+  EXPECT_EQ(names(with("use = \"texture\"\n", "use = \"points\"\n")), "b c a texture ");
+  EXPECT_EQ(names(with("use = \"texture\"\n", "use = \"texture\"\n")), "c a texture b texture ");
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nuse = \"colour\"\n"), HasSubstr("points, texture"));
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nuse = \"texture\"\n"), HasSubstr("add one that measures them"));
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\n[[camera]]\nname = \"t\"\npath = \"x\"\nuse = \"texture\"\n"
+                       "exposures_us = [2000, 8000]\n"),
+              HasSubstr("set exposure_us"));
+}
+
 TEST(ReadConfiguration, TakesAGainOfV4l2InDecibels) {
   const auto configuration = read("[[camera]]\ndriver = \"v4l2\"\ndevice = \"x\"\ngain_db = 6\n");
   ASSERT_TRUE(configuration) << to_string(configuration.error());

@@ -50,6 +50,20 @@ TEST_F(BlackBoxTest, KeepsTheNewestWithinItsBytes) {
   }
 }
 
+// A replay has no colours, so it needs no texture camera.
+TEST_F(BlackBoxTest, KeepsNoFramesOfTextureCameras) {
+  setup_->camera_names = {"left", "texture"};
+  setup_->texture_cameras = 1;
+  FrameSet set = set_of(7);
+  for (auto* frames : {&set.white, &set.dark})
+    for (int camera = 0; camera < 2; ++camera) frames->emplace_back(image_.view(), 1, MonotonicTime(), MonotonicTime());
+  box_.keep_frames("1", set, setup_, ScanRequest{});
+  const auto scans = box_.scans();
+  ASSERT_THAT(*scans.front().frames, SizeIs(3));
+  for (const FrameImage& frame : *scans.front().frames) EXPECT_EQ(frame.camera, "left");
+  EXPECT_EQ(scans.front().settings->camera_names, std::vector<std::string>{"left"});
+}
+
 // The memory of a scan that goes is that of the next: but not while a bundle is made of it.
 TEST_F(BlackBoxTest, LeavesAloneWhatABundleIsMadeOf) {
   keep(1);

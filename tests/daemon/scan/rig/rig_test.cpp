@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "daemon/scan/rig/rig.hpp"
 
+#include <thread>
+
 #include <gmock/gmock.h>
 
 #include "daemon/scan/cloud/frame_image.hpp"
@@ -241,9 +243,49 @@ TEST_F(RigTest, SetupKnowsItsCameras) {
   EXPECT_TRUE(setup.check({steady_clock::now(), true, "camera1"}));
   EXPECT_EQ(setup.camera_index("camera1"), 1U);
   EXPECT_EQ(setup.camera_index(""), 0U);
+  ScanSetup with_texture = setup_for(2);
+  with_texture.texture_cameras = 1;
+  EXPECT_TRUE(with_texture.check({steady_clock::now(), true, "camera0"}));
+  const auto texture = with_texture.check({steady_clock::now(), true, "camera1"});
+  ASSERT_FALSE(texture);
+  EXPECT_EQ(texture.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(texture.error().message, HasSubstr("use = \"texture\""));
   const auto unknown = setup.check({steady_clock::now(), true, "left"});
   ASSERT_FALSE(unknown);
   EXPECT_THAT(unknown.error().message, HasSubstr("camera0, camera1"));
+}
+
+// It is not waited for, and its exposure may lie apart.
+TEST_F(RigTest, TextureCameraExposesForColourAlone) {
+  const auto late = [](ScriptedCamera& camera, MonotonicTime) -> Result<Frame> {
+    std::this_thread::sleep_for(60ms);
+    return camera.frame(steady_clock::now());
+  };
+  std::vector<std::unique_ptr<Camera>> cameras;
+  cameras.push_back(std::make_unique<ScriptedCamera>("grey", *frame_));
+  auto texture = std::make_unique<ScriptedCamera>("texture", *frame_, std::deque<Step>{late, late, late});
+  ScriptedCamera& of_texture = *texture;
+  cameras.push_back(std::move(texture));
+  const ScanOptions options{.timeout_ms = 5000, .exposure_skew_ms = 40, .reopen_first_ms = 1, .reopen_longest_ms = 5};
+  Rig rig(std::make_unique<HeadlessProjector>(HeadlessProjectorOptions{}), std::move(cameras), draw_pattern(*pattern_),
+          options, {}, 1);
+  const MonotonicTime deadline = steady_clock::now() + 30s;
+  for (const LightFrames light : {LightFrames{}, {.white = true}, {.white = true, .dark = true}}) {
+    const auto set = rig.capture(deadline, Exposure::kFresh, light);
+    ASSERT_TRUE(set) << to_string(set.error());
+    EXPECT_EQ(set->frames.size(), 1U);
+    EXPECT_EQ(set->white.size(), light.white ? 1U : 0U);
+    EXPECT_EQ(set->dark.size(), light.dark ? 1U : 0U);
+  }
+  EXPECT_EQ(of_texture.captures, 0);
+  const auto set = rig.capture(deadline, Exposure::kFresh, {.white = true, .dark = true, .colour = true});
+  ASSERT_TRUE(set) << to_string(set.error());
+  EXPECT_EQ(set->frames.size(), 1U);
+  EXPECT_EQ(set->white.size(), 2U);
+  EXPECT_EQ(set->dark.size(), 2U);
+  EXPECT_EQ(of_texture.captures, 2);
+  of_texture.gone = true;
+  EXPECT_TRUE(rig.capture(deadline, Exposure::kFresh, {.white = true}));
 }
 
 TEST_F(RigTest, OneCameraMayBeCapturedAlone) {
