@@ -138,6 +138,21 @@ std::size_t row_bytes(GreyLayout layout, int width_px) {
   }
 }
 
+bool has_chroma_planes(std::uint32_t fourcc) {
+  return fourcc == V4L2_PIX_FMT_NV12 || fourcc == V4L2_PIX_FMT_YUV420;
+}
+
+ChromaPlanes::ChromaPlanes(const FrameLayout& layout) {
+  const auto columns = static_cast<std::size_t>(layout.mode.width_px + 1) / 2;
+  const auto rows = static_cast<std::size_t>(layout.mode.height_px + 1) / 2;
+  const bool pairs = layout.mode.format.fourcc == V4L2_PIX_FMT_NV12;
+  blue = layout.stride_bytes * static_cast<std::size_t>(layout.mode.height_px);
+  step_bytes = pairs ? 2 : 1;
+  stride_bytes = pairs ? layout.stride_bytes : layout.stride_bytes / 2;  // V4L2 halves the padding of a plane, too
+  red = pairs ? blue + 1 : blue + stride_bytes * rows;
+  end = red + stride_bytes * (rows - 1) + step_bytes * (columns - 1) + 1;
+}
+
 int bytes_per_pixel(GreyLayout layout) {
   return layout == GreyLayout::kGrey16 || layout == GreyLayout::kMosaic16 ? 2 : 1;
 }

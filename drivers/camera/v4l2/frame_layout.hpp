@@ -71,6 +71,18 @@ struct FrameLayout {
   std::size_t bytes_min = 0;
 };
 
+/// Tells whether planes of chroma follow the rows of grey: NV12 and YUV420.
+[[nodiscard]] bool has_chroma_planes(std::uint32_t fourcc);
+
+/// The places of chroma in such a frame, in bytes.
+struct ChromaPlanes {
+  explicit ChromaPlanes(const FrameLayout& layout);
+  std::size_t blue, red;     ///< the first Cb and Cr
+  std::size_t step_bytes;    ///< from one Cb to the next of its row
+  std::size_t stride_bytes;  ///< from one row to the next
+  std::size_t end;           ///< after the last byte
+};
+
 /// "GREY 1600x1200".
 [[nodiscard]] std::string to_string(const FrameMode& mode);
 

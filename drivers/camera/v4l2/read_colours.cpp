@@ -64,6 +64,21 @@ ColourFrame from_chroma(const Bytes& bytes, const FrameLayout& layout, std::size
   return colours;
 }
 
+/// Rows of luma, then chroma for each square of four pixels: NV12 has rows of pairs, YUV420 a plane of each.
+ColourFrame from_planes(const Bytes& bytes, const FrameLayout& layout) {
+  ColourFrame colours(layout.mode.width_px, layout.mode.height_px);
+  const ChromaPlanes planes(layout);
+  for (int y = 0; y < colours.height(); ++y) {
+    const std::byte* const luma = bytes.data() + static_cast<std::size_t>(y) * layout.stride_bytes;
+    const std::size_t row = static_cast<std::size_t>(y / 2) * planes.stride_bytes;
+    for (int x = 0; x < colours.width(); ++x) {
+      const std::size_t at = row + static_cast<std::size_t>(x / 2) * planes.step_bytes;
+      colours.at(x, y) = rgb_of(luma[x], bytes[planes.blue + at], bytes[planes.red + at]);
+    }
+  }
+  return colours;
+}
+
 Result<ColourFrame> from_jpeg(const Bytes& bytes, const FrameLayout& layout) {
   JpegDecoder decoder({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   if (auto header = decoder.read_header(); !header) return tl::unexpected(std::move(header.error()));
@@ -83,6 +98,8 @@ Result<ColourFrame> convert(const Bytes& bytes, const FrameLayout& layout) {
       return from_chroma(bytes, layout, 1);
     case GreyLayout::kJpeg:
       return from_jpeg(bytes, layout);
+    case GreyLayout::kGrey8:
+      return from_planes(bytes, layout);
     default:
       return colours_from_mosaic(mosaic_view_of(bytes, layout), pattern_of(layout.mode.format.fourcc));
   }
@@ -92,7 +109,9 @@ Result<ColourFrame> convert(const Bytes& bytes, const FrameLayout& layout) {
 
 std::function<Result<ColourFrame>()> colours_later(std::span<const std::byte> bytes, const FrameLayout& layout) {
   const GreyLayout kind = layout.mode.format.layout;
-  if (kind == GreyLayout::kGrey8 || kind == GreyLayout::kGrey16) return {};
+  const bool planes = has_chroma_planes(layout.mode.format.fourcc);
+  if ((kind == GreyLayout::kGrey8 && !planes) || kind == GreyLayout::kGrey16) return {};
+  if (planes && bytes.size() < ChromaPlanes(layout).end) return {};  // the driver gives the luma alone
   return [copy = std::make_shared<const Bytes>(bytes.begin(), bytes.end()), layout] { return convert(*copy, layout); };
 }
 

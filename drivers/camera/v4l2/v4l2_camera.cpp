@@ -309,8 +309,10 @@ bool V4l2Camera::is_whole(const v4l2_buffer& buffer) const {
 Result<Frame> V4l2Camera::deliver(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received) {
   if (pool_) return convert(buffer, exposure_start, received);
   ++counts_.delivered;
-  return Frame(view_of(stream_->buffers().bytes(buffer.index), layout_), next_sequence_++, exposure_start, received,
-               stream_->lend(buffer.index));
+  const auto bytes = stream_->buffers().bytes(buffer.index);
+  Frame frame(view_of(bytes, layout_), next_sequence_++, exposure_start, received, stream_->lend(buffer.index));
+  if (light_ == Picture::kPattern) return frame;
+  return std::move(frame).with_colours(colours_later(bytes.first(buffer.bytesused), layout_));
 }
 
 Result<Frame> V4l2Camera::convert(const v4l2_buffer& buffer, MonotonicTime exposure_start, MonotonicTime received) {

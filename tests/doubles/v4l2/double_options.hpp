@@ -20,7 +20,8 @@ using FrameSource = std::function<void(std::uint64_t number, Grey8& image)>;
 
 /// What a V4L2 double can deliver.
 struct DoubleFormat {
-  std::uint32_t fourcc = V4L2_PIX_FMT_GREY;  ///< GREY, Y16, Y12, Y10, a mosaic of 8 or 16 bits, YUYV, UYVY or MJPG
+  std::uint32_t fourcc = V4L2_PIX_FMT_GREY;  ///< GREY, Y16, Y12, Y10, a mosaic of 8 or 16 bits, NV12, YUV420, YUYV,
+                                             ///< UYVY or MJPG
   std::vector<std::pair<int, int>> sizes{{160, 120}};
 };
 

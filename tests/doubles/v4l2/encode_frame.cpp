@@ -4,6 +4,7 @@
 
 #include <linux/videodev2.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 
@@ -27,6 +28,10 @@ int shift_of(std::uint32_t fourcc) {
     default:
       return 0;
   }
+}
+
+bool has_planes(std::uint32_t fourcc) {
+  return fourcc == V4L2_PIX_FMT_NV12 || fourcc == V4L2_PIX_FMT_YUV420;
 }
 
 void encode_row(const std::uint8_t* from, int width, std::uint32_t fourcc, std::byte* to) {
@@ -86,14 +91,18 @@ int row_bytes_of(std::uint32_t fourcc, int width) {
 
 std::size_t frame_bytes_of(std::uint32_t fourcc, int width, int height, int padding_bytes) {
   if (fourcc == V4L2_PIX_FMT_MJPEG) return static_cast<std::size_t>(width) * height * 2;
-  return static_cast<std::size_t>(row_bytes_of(fourcc, width) + padding_bytes) * height;
+  const std::size_t luma = static_cast<std::size_t>(row_bytes_of(fourcc, width) + padding_bytes) * height;
+  return has_planes(fourcc) ? luma + luma / 2 : luma;
 }
 
 std::size_t encode_frame(const Grey8& image, std::uint32_t fourcc, int padding_bytes, std::vector<std::byte>& bytes) {
   if (fourcc == V4L2_PIX_FMT_MJPEG) return encode_jpeg(image, bytes);
   const auto stride = static_cast<std::size_t>(row_bytes_of(fourcc, image.width()) + padding_bytes);
   for (int y = 0; y < image.height(); ++y) encode_row(image.row(y), image.width(), fourcc, bytes.data() + y * stride);
-  return stride * image.height();
+  const std::size_t luma = stride * image.height();
+  if (!has_planes(fourcc)) return luma;
+  std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(luma), luma / 2, std::byte{128});
+  return luma + luma / 2;
 }
 
 }  // namespace slsd::test

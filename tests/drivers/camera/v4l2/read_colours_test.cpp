@@ -53,6 +53,45 @@ TEST(ColoursLater, ConvertsChromaInEitherOrder) {
   }
 }
 
+TEST(ColoursLater, ConvertsPlanesOfChroma) {
+  using Colour = std::array<double, 3>;
+  const std::array<Colour, 4> squares{Colour{200, 30, 60}, {10, 220, 90}, {255, 255, 255}, {40, 50, 210}};
+  for (const char* const fourcc : {"NV12", "YU12"}) {
+    constexpr std::size_t kWidth = 4, kHeight = 4, kStride = 8;  // four squares of four pixels, and padding
+    const bool pairs = std::string(fourcc) == "NV12";
+    std::vector<std::uint8_t> frame(kStride * kHeight * 3 / 2, 99);
+    for (std::size_t square = 0; square < squares.size(); ++square) {
+      const auto [y, cb, cr] = ycc(squares[square]);
+      const std::size_t column = square % 2, row = square / 2, chroma = kStride * kHeight;
+      for (const std::size_t pixel : {0U, 1U, 2U, 3U})
+        frame[kStride * (2 * row + pixel / 2) + 2 * column + pixel % 2] = y;
+      const std::size_t plane = kStride / 2 * kHeight / 2;
+      frame[chroma + (pairs ? kStride * row + 2 * column : kStride / 2 * row + column)] = cb;
+      frame[chroma + (pairs ? kStride * row + 2 * column + 1 : plane + kStride / 2 * row + column)] = cr;
+    }
+    const FrameLayout layout = layout_of(fourcc, kWidth, kHeight, kStride);
+    const auto colours = colours_later(bytes_of(frame), layout)();
+    ASSERT_TRUE(colours);
+    for (std::size_t i = 0; i < colours->size(); ++i)
+      for (std::size_t k = 0; k < 3; ++k)
+        EXPECT_NEAR(colours->data()[i][k], squares[i / 8 * 2 + i % 4 / 2][k], 2) << fourcc << " pixel " << i;
+    const std::size_t end = ChromaPlanes(layout).end;
+    EXPECT_LE(end, frame.size());
+    EXPECT_TRUE(colours_later(bytes_of(frame).first(end), layout));
+    EXPECT_FALSE(colours_later(bytes_of(frame).first(end - 1), layout)) << "luma alone";
+  }
+}
+
+TEST(ColoursLater, ReadsChromaOfOddSizes) {
+  for (const char* const fourcc : {"NV12", "YU12"}) {
+    const FrameLayout layout = layout_of(fourcc, 5, 3, 6);
+    const std::vector<std::uint8_t> frame(ChromaPlanes(layout).end, 128);
+    const auto colours = colours_later(bytes_of(frame), layout)();
+    ASSERT_TRUE(colours);
+    EXPECT_EQ(*colours, ColourFrame(5, 3, {130, 130, 130})) << fourcc;
+  }
+}
+
 TEST(ColoursLater, KnowsThePatternOfEveryMosaic) {
   for (const auto& [fourcc, pattern] : {std::pair("RGGB", BayerPattern::kRggb),
                                         {"BA81", BayerPattern::kBggr},

@@ -146,6 +146,24 @@ TEST_F(V4l2CameraTest, AllocatesNothingPerFrame) {
   }
 }
 
+TEST_F(V4l2CameraTest, GivesColoursInWhiteLightAlone) {
+  for (const std::uint32_t fourcc :
+       {V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_YUV420, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_SRGGB8}) {
+    DoubleOptions options = test::quick_double();
+    options.formats = {{fourcc, {{160, 120}}}};
+    if (!make(options)) return;
+    ASSERT_TRUE(camera_->open());
+    EXPECT_TRUE(capture()->colours()->empty());
+    camera_->expect(Picture::kWhite);
+    const auto frame = capture();
+    ASSERT_TRUE(frame) << to_string(frame.error());
+    const auto colours = frame->colours();
+    ASSERT_TRUE(colours) << to_string(colours.error());
+    EXPECT_EQ(colours->width(), fourcc == V4L2_PIX_FMT_GREY ? 0 : 160) << fourcc_name(fourcc);
+    camera_.reset();
+  }
+}
+
 TEST_F(V4l2CameraTest, OpensAnewWhileFramesAreHeldAndLeavesThemAlone) {
   if (!make(test::quick_double())) return;
   ASSERT_TRUE(camera_->open());

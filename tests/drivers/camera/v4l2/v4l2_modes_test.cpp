@@ -38,7 +38,8 @@ TEST_P(V4l2Format, GivesEachFrameWhole) {
 INSTANTIATE_TEST_SUITE_P(All, V4l2Format,
                          ::testing::Values(V4L2_PIX_FMT_GREY, V4L2_PIX_FMT_Y10, V4L2_PIX_FMT_Y12, V4L2_PIX_FMT_Y16,
                                            V4L2_PIX_FMT_SBGGR8, V4L2_PIX_FMT_SRGGB10, V4L2_PIX_FMT_SRGGB16,
-                                           V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_UYVY, V4L2_PIX_FMT_MJPEG),
+                                           V4L2_PIX_FMT_NV12, V4L2_PIX_FMT_YUV420, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_UYVY,
+                                           V4L2_PIX_FMT_MJPEG),
                          [](const auto& instance) { return fourcc_name(instance.param); });
 
 FrameMode mode(const char* format, int width, int height) {
