@@ -55,7 +55,7 @@ TEST(ReadDensePly, RefusesWhatIsCutOrAnotherFile) {
       read_dense_ply("ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty uchar symbol\nend_header\n")
           .error()
           .message,
-      HasSubstr("density = \"pixels\""));
+      HasSubstr("with --density pixels"));
   std::string nameless = dense_ply_header({"id", "", 1, 1, false}, 1) + record(1, 2, 600, 0, 'i', '\0');
   EXPECT_THAT(read_dense_ply(nameless).error().message, HasSubstr("no sigma"));
 }
