@@ -5,6 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 namespace slsd {
 namespace {
 
