@@ -179,7 +179,7 @@ Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::ta
                 "them, or leave the key out",
                 place_of(tables.front()->get("use")->source(), file.string()));
   }
-  std::ranges::stable_partition(cameras, &CameraOptions::measures);
+  std::stable_partition(cameras.begin(), cameras.end(), [](const CameraOptions& camera) { return camera.measures(); });
   return cameras;
 }
 
