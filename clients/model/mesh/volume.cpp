@@ -15,6 +15,7 @@
 #include <Eigen/Geometry>
 
 #include "clients/model/mesh/close_field.hpp"
+#include "clients/model/range_image.hpp"
 #include "core/colour.hpp"
 #include "core/mesh/mesh.hpp"
 
@@ -406,10 +407,8 @@ Mesh extract(const openvdb::FloatGrid& field, VertexReader reader, float voxel_m
     mesh.vertices_mm.push_back(voxel * voxel_mm);
     mesh.sigma_mm.push_back(vertex->sigma_mm);
     mesh.frames.push_back(static_cast<std::uint16_t>(std::lround(vertex->frames)));
-    const auto level = [](float value) { return static_cast<std::uint8_t>(std::lround(value)); };
-    mesh.intensity.push_back(level(vertex->intensity));
-    const Eigen::Vector3f& colour = vertex->colour;
-    if (reader.coloured()) mesh.colours.push_back({level(colour.x()), level(colour.y()), level(colour.z())});
+    mesh.intensity.push_back(static_cast<std::uint8_t>(std::lround(vertex->intensity)));
+    if (reader.coloured()) mesh.colours.push_back(to_rgb(vertex->colour));
   }
   add_quads(quads, kept, mesh);
   return mesh;

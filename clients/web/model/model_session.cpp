@@ -372,11 +372,17 @@ void ModelSession::note(const json& line) {
 void ModelSession::note_end(const ModelProgram::End& end) {
   const std::lock_guard lock(mutex_);
   if (abandoned_) return;
-  const bool done = new_report_.is_object();
-  state_ = done ? "done" : "failed";
+  bool done = new_report_.is_object();
   building_ = nullptr;
   if (!done && error_.is_null()) error_ = {{"name", "error"}, {"message", reason_of(end)}};
-  if (made_in_ != folder_) end_rebuild(done);
+  if (made_in_ != folder_) {
+    if (const auto ended = end_rebuild(done); !ended) {
+      done = false;
+      report_ = nullptr;  // the files may be of two models
+      error_ = {{"name", to_string(ended.error().code)}, {"message", to_string(ended.error())}};
+    }
+  }
+  state_ = done ? "done" : "failed";
   if (done) report_ = new_report_;
   const json session{
       {"state", state_}, {"choices", choices_}, {"report", report_}, {"error", error_}, {"progress", progress_}};
@@ -385,21 +391,28 @@ void ModelSession::note_end(const ModelProgram::End& end) {
 }
 
 /// Puts the new model in the place of the one before, or shows the latter again.
-void ModelSession::end_rebuild(bool done) {
+/// @errors kIo: a file cannot be moved
+Result<> ModelSession::end_rebuild(bool done) {
   std::error_code ignored;
+  Result<> moved;
+  const auto move = [&](const std::string& name) {
+    std::error_code wrong;
+    std::filesystem::rename(made_in_ / name, folder_ / name, wrong);
+    if (wrong && moved)
+      moved = fail(ErrorCode::kIo, "cannot replace the model before: " + wrong.message() + "; build again",
+                   (folder_ / name).string());
+  };
   if (done) {
     std::filesystem::remove(folder_ / "session.json", ignored);  // first: cut amid this, the files are of two models
-    std::filesystem::rename(made_in_ / "preview.ply", folder_ / "preview.ply", ignored);
-    for (const std::string_view format : kModelFormats) {
-      const std::string name = "model." + std::string(format);
-      std::filesystem::rename(made_in_ / name, folder_ / name, ignored);
-    }
+    move("preview.ply");
+    for (const std::string_view format : kModelFormats) move("model." + std::string(format));
   } else {
     progress_ = progress_before_;
     ++previews_;
   }
   std::filesystem::remove_all(made_in_, ignored);
   made_in_ = folder_;
+  return moved;
 }
 
 std::optional<Refusal> ModelSession::keep_background(std::string_view ply) {

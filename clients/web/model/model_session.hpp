@@ -74,7 +74,7 @@ class ModelSession {
   void forget();
   void note(const nlohmann::json& line);
   void note_end(const ModelProgram::End& end);
-  void end_rebuild(bool done);
+  [[nodiscard]] Result<> end_rebuild(bool done);
   [[nodiscard]] bool runs() const;
   [[nodiscard]] std::size_t kept_clouds() const;
 

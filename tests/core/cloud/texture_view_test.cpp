@@ -23,7 +23,7 @@ using Seen = TextureView::Seen;
 constexpr ColourLevels kWall{20, 200, 20}, kFront{200, 20, 20}, kSide{20, 20, 200}, kNothing{0, 0, 0};
 constexpr float kNoPoint = std::numeric_limits<float>::quiet_NaN();
 
-/// What a ray meets first.
+/// The first surface that a ray meets.
 struct Hit {
   double distance = std::numeric_limits<double>::infinity();
   ColourLevels colour = kNothing;
@@ -74,7 +74,7 @@ ColourFrame picture_of(const Scene& scene, const CalibratedCamera& camera) {
   return picture;
 }
 
-/// What a camera beside a projector measures: points on a grid that both see, with noise along its rays.
+/// Points that a camera beside a projector measures: on a grid that both see, with noise along its rays.
 struct Measured {
   MeasuredSurface grid;
   std::vector<ColourLevels> colours;
