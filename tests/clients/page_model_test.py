@@ -319,6 +319,22 @@ class Requests(ModelTest):
                 self.assertEqual(self.kept(web), kept)
                 self.assertFalse((self.folder / "new").exists())
 
+    def test_a_model_that_cannot_be_replaced_is_named(self):
+        with Service() as service, Scanner(service) as scanner, self.web(scanner) as web:
+            self.finished(web, scanner)
+            (self.folder / "model.glb").unlink()
+            (self.folder / "model.glb" / "in the way").mkdir(parents=True)
+            self.act(web, "build", voxel_mm=2)
+            told = self.wait_state(web, "failed")
+            self.assertIn("cannot replace the model before: ", told["error"]["message"])
+            self.assertIn("model.glb", told["error"]["message"])
+            self.assertEqual((told["report"], told["formats"]), (None, {}))
+            (self.folder / "model.glb" / "in the way").rmdir()
+            (self.folder / "model.glb").rmdir()
+            self.act(web, "build", voxel_mm=2)
+            self.wait_state(web, "done")
+            self.kept(web)
+
     def test_without_the_package_it_says_what_to_install(self):
         alone = self.folder.parent / "bin"
         alone.mkdir()
@@ -363,6 +379,15 @@ class Operator(ModelTest):
         if width < 1100:
             browser.click("nav [data-view=model]")
         browser.wait("modelTold !== null", "no word of the model")
+
+    def follow_and_stop(self, browser, scanner):
+        """A model of the first clouds, as soon as it is built."""
+        self.choose(browser, "model-turned", "stopped")
+        browser.click("#model-start")
+        scanner.let(3)
+        browser.wait("modelTold.progress && modelTold.progress.placed === 3", "nothing is placed")
+        browser.click("#model-stop")
+        scanner.let(2)
 
     def choose(self, browser, name, value):
         browser.run("const c = document.getElementById(arguments[0]); c.value = arguments[1];"
@@ -467,12 +492,7 @@ class Operator(ModelTest):
         with Service() as service, Scanner(service) as scanner, self.web(scanner) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web)
-            self.choose(browser, "model-turned", "stopped")
-            browser.click("#model-start")
-            scanner.let(3)
-            browser.wait("modelTold.progress && modelTold.progress.placed === 3", "nothing is placed")
-            browser.click("#model-stop")
-            scanner.let(2)
+            self.follow_and_stop(browser, scanner)
             browser.wait("modelTold.state === 'done' && document.getElementById('model-start').dataset.busy !== 'yes'", "no model")
             browser.click("#model-start")
             self.assertEqual(self.text(browser, "model-start"), "Replace the model?")
@@ -489,12 +509,7 @@ class Operator(ModelTest):
                 tempfile.TemporaryDirectory() as downloads, Browser(downloads) as browser:
             service.wait_ready()
             self.open(browser, web)
-            self.choose(browser, "model-turned", "stopped")
-            browser.click("#model-start")
-            scanner.let(3)
-            browser.wait("modelTold.progress && modelTold.progress.placed === 3", "nothing is placed")
-            browser.click("#model-stop")
-            scanner.let(2)
+            self.follow_and_stop(browser, scanner)
             browser.wait("modelTold.state === 'done' && modelPreview === modelTold.previews", "no model")
             figures, drawn = self.text(browser, "model-figures"), self.drawn(browser)[0]
             browser.run("boxChosen = [0, 0, 1, 1, 1, 2];")
