@@ -120,7 +120,7 @@ void BlackBox::keep_frames(const std::string& id, const FrameSet& set, const Sha
     const std::lock_guard lock(mutex_);
     Entry& entry = find_or_begin(id, setup);
     entry.scan.density = request.formats.dense() ? Density::kPixels : Density::kSymbols;
-    entry.scan.part = request.part ? *request.part : setup->cloud;
+    entry.scan.part = request.part.value_or(setup->cloud);
     if (entry.scan.part.in_base()) entry.scan.base_from_rig = setup->base_from_rig(request.base_from_flange);
     entry.scan.too_large = needed + kScanBytes > bytes_max_;
     if (entry.scan.too_large) return make_room(id);
