@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Headless Chromium by its driver, over the WebDriver protocol, with the standard library alone."""
+"""Headless Chromium by its driver, over the WebDriver protocol, with the standard library alone. The tests of a program share
+one: each begins without a page, cookies, cache and complaints."""
+import atexit
 import base64
 import json
 import shutil
@@ -28,13 +30,23 @@ def free_port():
 
 
 class Browser:
+    idle = []  # what tests left behind that need no arguments
+
     def __init__(self, downloads=None, arguments=()):
+        self.arguments = tuple(arguments)
+        if self.idle and not self.arguments:
+            self.__dict__ = self.idle.pop().__dict__
+        else:
+            self.start()
+            atexit.register(self.end)
+        self.devtools("Browser.setDownloadBehavior", behavior="allow", downloadPath=str(downloads or self.profile))
+
+    def start(self):
         self.port = free_port()
         self.profile = tempfile.mkdtemp(prefix="slsd-test-chromium-")
         self.driver = subprocess.Popen(["chromedriver", f"--port={self.port}"], stdout=subprocess.DEVNULL,
                                        stderr=subprocess.DEVNULL)
-        options = {"binary": shutil.which("chromium"), "args": [*ARGUMENTS, *arguments, f"--user-data-dir={self.profile}"],
-                   "prefs": {"download.default_directory": str(downloads or self.profile)}}
+        options = {"binary": shutil.which("chromium"), "args": [*ARGUMENTS, *self.arguments, f"--user-data-dir={self.profile}"]}
         end = time.monotonic() + TIMEOUT_S
         while True:
             try:
@@ -122,7 +134,24 @@ class Browser:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, failure, *_):
+        if failure or self.arguments:
+            self.end()
+        else:
+            self.forget()
+            self.idle.append(self)
+
+    def forget(self):
+        self.close_others()
+        self.open("about:blank")
+        for command in ("Network.clearBrowserCookies", "Network.clearBrowserCache", "Emulation.clearDeviceMetricsOverride"):
+            self.devtools(command)
+        self.devtools("Emulation.setEmulatedMedia", features=[])
+        self.complaints()
+
+    def end(self):
+        if self.driver.poll() is not None:
+            return
         try:
             self.ask("DELETE", self.session)
         finally:
