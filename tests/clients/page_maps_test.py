@@ -12,7 +12,7 @@ import unittest
 import numpy as np
 
 from browser import Browser, is_there
-from page_service import Web, downloaded
+from page_service import CONFIGURATION, Web, downloaded
 from service import SCENE, Service
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
@@ -103,7 +103,7 @@ class Maps(unittest.TestCase):
                 np.testing.assert_array_equal(*(np.ascontiguousarray(each["rgb"]).view("<u4") for each in (shown, own)))
 
     def test_a_dense_map_says_what_the_file_has_at_each_pixel(self):
-        with Service() as service, Web(service) as web, Browser() as browser, service.client() as client:
+        with Service(configuration=CONFIGURATION) as service, Web(service) as web, Browser() as browser, service.client() as client:
             service.wait_ready()
             self.open(browser, web)
             self.scan(browser, "pixels")
@@ -165,8 +165,8 @@ class Maps(unittest.TestCase):
             browser.click("#cloud-live")
 
     def test_maps_follow_live_clouds_of_pixels(self):
-        with Service() as service, Web(service) as web, tempfile.TemporaryDirectory() as downloads, Browser(downloads) as browser, \
-                service.client() as client:
+        with Service(configuration=CONFIGURATION) as service, Web(service) as web, tempfile.TemporaryDirectory() as downloads, \
+                Browser(downloads) as browser, service.client() as client:
             service.wait_ready()
             self.open(browser, web)
             self.choose(browser, "density", "pixels")
@@ -204,7 +204,7 @@ class Maps(unittest.TestCase):
             self.assertEqual(browser.complaints(), [])
 
     def test_the_newest_live_cloud_wins_and_frames_of_clipping_are_few(self):
-        with Service() as service, Web(service) as web, Browser() as browser:
+        with Service(configuration=CONFIGURATION) as service, Web(service) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web)
             browser.run("""
@@ -241,7 +241,7 @@ class Maps(unittest.TestCase):
             self.assertEqual(browser.complaints(), [])
 
     def test_a_cloud_of_pixels_that_was_live_in_space_has_no_map_and_the_page_says_so(self):
-        with Service() as service, Web(service) as web, Browser() as browser:
+        with Service(configuration=CONFIGURATION) as service, Web(service) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web)
             self.choose(browser, "density", "pixels")
@@ -257,7 +257,7 @@ class Maps(unittest.TestCase):
             browser.wait("map.records && document.getElementById('message').hidden", "the complaint stays")
 
     def test_several_distances_agree_with_numpy_on_both_views(self):
-        with Service() as service, Web(service) as web, Browser() as browser, service.client() as client:
+        with Service(configuration=CONFIGURATION) as service, Web(service) as web, Browser() as browser, service.client() as client:
             service.wait_ready()
             self.open(browser, web)
             self.scan(browser, "pixels")
@@ -298,7 +298,8 @@ class Maps(unittest.TestCase):
             browser.resize(1600, 1300)
             same = browser.run("""
                 const at = view.points.geometry.getAttribute('position').array;
-                return [0, 1, 700, 1900, view.ply.count - 1].map((i) => {
+                const n = view.ply.count;
+                return [0, 1, Math.floor(0.3 * n), Math.floor(0.8 * n), n - 1].map((i) => {
                   const [x, y, z] = pointOf(view.ply, recordOf(i, view.ply.count)).at;
                   return x === at[3 * i] && y === -at[3 * i + 1] && z === -at[3 * i + 2];
                 });""")

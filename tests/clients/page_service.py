@@ -16,6 +16,22 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "daemon"))
 from service import BIN, TIMEOUT_S, wait_until
 
 TOKEN = "correct horse battery staple"
+# A frame with few pixels: its dense clouds are quickly computed and drawn.
+BUST = pathlib.Path(__file__).resolve().parents[1] / "corpus" / "8px-6-bust"
+CONFIGURATION = f"""
+[pattern]
+file = "{BUST}/pattern.toml"
+[[camera]]
+name = "camera"
+driver = "file"
+path = "{BUST}/frame.png"
+[calibration]
+file = "{BUST}/calibration.yml"
+[scan]
+timeout_ms = 600000
+[server]
+socket = "slsd.sock"
+"""
 
 
 class Web:

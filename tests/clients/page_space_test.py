@@ -11,25 +11,10 @@ import unittest
 import numpy as np
 
 from browser import Browser, is_there
-from page_service import Web
+from page_service import CONFIGURATION, Web
 from service import Service
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
-BUST = pathlib.Path(__file__).resolve().parents[1] / "corpus" / "8px-6-bust"
-CONFIGURATION = f"""
-[pattern]
-file = "{BUST}/pattern.toml"
-[[camera]]
-name = "camera"
-driver = "file"
-path = "{BUST}/frame.png"
-[calibration]
-file = "{BUST}/calibration.yml"
-[scan]
-timeout_ms = 600000
-[server]
-socket = "slsd.sock"
-"""
 HAND_EYE = """%YAML:1.0
 ---
 mounted: "cell"
