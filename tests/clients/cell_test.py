@@ -90,12 +90,21 @@ class Merged(Folder):
     def foreign(self, name, *header):
         """Another program that publishes clouds under this name."""
         other = subprocess.Popen([BIN / "dds_probe", "--domain", str(DOMAIN), "--write", f"{name}/points", "--seconds", "600",
-                                  *([] if "--frame" in header else ["--frame", f"{name}_optical_frame"]), *header])
+                                  *self.header_of(name, header)], stdin=subprocess.PIPE, text=True)
         try:
             yield other
         finally:
             other.terminate()
             other.wait(600)
+            other.stdin.close()
+
+    def header_of(self, name, header=()):
+        return [*([] if "--frame" in header else ["--frame", f"{name}_optical_frame"]), *header]
+
+    def write_with(self, other, name, header=()):
+        """The clouds to come have another header."""
+        other.stdin.write(" ".join(self.header_of(name, header)) + "\n")
+        other.stdin.flush()
 
     def points(self, message):
         self.assertEqual([tuple(field) for field in message["fields"]], FIELDS)
@@ -196,15 +205,17 @@ class Merged(Folder):
                 ["--frame", "map"], ["--row-step", "1999"], ["--width", "0", "--height", "4294967295", "--row-step", "4294967295"])
         with self.foreign("left"), self.merge(CELL / "truth.toml") as merge:
             self.wait_state("right: no cloud yet", "the honest one")
-            for lie in lies:
-                with self.foreign("right"):
+            with self.foreign("right") as other:
+                for lie in lies:
+                    self.write_with(other, "right")
                     self.wait_state("", "an honest one")
-                with self.subTest(lie=lie), self.foreign("right", *lie):
-                    self.wait_state("right: cloud_malformed", "that it is not believed")
-                    self.assertIsNone(merge.process.poll())
-                    self.clouds.next()
-                    message = self.clouds.next().point_cloud()
-                    self.assertEqual((message["width"], set(self.points(message)["scanner"])), (100, {0}))
+                    with self.subTest(lie=lie):
+                        self.write_with(other, "right", lie)
+                        self.wait_state("right: cloud_malformed", "that it is not believed")
+                        self.assertIsNone(merge.process.poll())
+                        self.clouds.next()
+                        message = self.clouds.next().point_cloud()
+                        self.assertEqual((message["width"], set(self.points(message)["scanner"])), (100, {0}))
 
     def test_is_refused_without_extrinsics(self):
         alone = self.folder / "alone.toml"

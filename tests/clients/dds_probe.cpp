@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <poll.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -12,8 +13,10 @@
 #include <iostream>
 #include <iterator>
 #include <map>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <dds/dds.h>
@@ -139,14 +142,39 @@ struct ForeignCloud {
   bool is_bigendian = false;
 };
 
+void add_header(CLI::App& app, ForeignCloud& cloud) {
+  app.add_option("--frame", cloud.frame_id);
+  app.add_option("--width", cloud.width);
+  app.add_option("--height", cloud.height);
+  app.add_option("--point-step", cloud.point_step);
+  app.add_option("--row-step", cloud.row_step);
+  app.add_option("--bytes", cloud.bytes);
+  app.add_option("--x-offset", cloud.x_offset);
+  app.add_flag("--big-endian", cloud.is_bigendian);
+}
+
+// Another header for the clouds to come: a line of standard input, with the options of a header. It saves the seconds
+// that another writer needs to be found.
+std::optional<ForeignCloud> next_header() {
+  pollfd input{STDIN_FILENO, POLLIN, 0};
+  std::string line;
+  if (::poll(&input, 1, 0) <= 0 || !std::getline(std::cin, line)) return std::nullopt;
+  ForeignCloud cloud;
+  CLI::App app;
+  add_header(app, cloud);
+  app.parse(line);
+  return cloud;
+}
+
 int write_clouds(const Network& network, const std::string& topic, ForeignCloud cloud, double seconds) {
   const auto writer = network.writer(sensor_msgs_msg_dds__PointCloud2__desc, "rt/" + topic, Quality::kSensor);
   std::string x = "x", y = "y", z = "z";
-  sensor_msgs_msg_dds__PointField_ fields[] = {
-      {x.data(), cloud.x_offset, 7, 1}, {y.data(), 4, 7, 1}, {z.data(), 8, 7, 1}};
-  std::vector<std::uint8_t> data(cloud.bytes);
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
   while (!ended && std::chrono::steady_clock::now() < end) {
+    if (auto next = next_header()) cloud = std::move(*next);
+    sensor_msgs_msg_dds__PointField_ fields[] = {
+        {x.data(), cloud.x_offset, 7, 1}, {y.data(), 4, 7, 1}, {z.data(), 8, 7, 1}};
+    std::vector<std::uint8_t> data(cloud.bytes);
     const std::int64_t now = now_ns();
     sensor_msgs_msg_dds__PointCloud2_ message{};
     message.header = {{static_cast<std::int32_t>(now / 1'000'000'000), static_cast<std::uint32_t>(now % 1'000'000'000)},
@@ -210,15 +238,9 @@ int main(int argc, char** argv) {
   app.add_option("--call", service, "the trigger service of this scanner");
   std::string written;
   ForeignCloud cloud;
-  app.add_option("--write", written, "write clouds to this topic, of a header with these:");
-  app.add_option("--frame", cloud.frame_id);
-  app.add_option("--width", cloud.width);
-  app.add_option("--height", cloud.height);
-  app.add_option("--point-step", cloud.point_step);
-  app.add_option("--row-step", cloud.row_step);
-  app.add_option("--bytes", cloud.bytes);
-  app.add_option("--x-offset", cloud.x_offset);
-  app.add_flag("--big-endian", cloud.is_bigendian);
+  app.add_option("--write", written,
+                 "write clouds to this topic, of a header with these; a line of standard input gives others:");
+  add_header(app, cloud);
   bool writes_transforms = false;
   app.add_flag("--transforms", writes_transforms, "write transforms of standard input to /tf and /tf_static");
   app.add_flag("--stamps", stamps, "topic, stamp, time of arrival (ns), bytes");
