@@ -3,6 +3,7 @@
 #include "core/calibrate/solve/board_shape.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace slsd {
 namespace {
@@ -24,6 +25,24 @@ std::array<double, kOrders> powers_of(double base) {
   return powers;
 }
 
+/// Adds a term. Its powers are constants of the program: looking them up would double the time.
+template <std::size_t kTerm>
+void add_term(double by_mm, const std::array<double, kOrders>& u, const std::array<double, kOrders>& v,
+              ShapeAt& shape) {
+  constexpr Powers kPower = kPowers[kTerm];
+  const double term = u[kPower.u] * v[kPower.v];
+  shape.by_term(static_cast<Eigen::Index>(kTerm)) = term;
+  shape.height_mm += by_mm * term;
+  if constexpr (kPower.u > 0) shape.slope.x() += by_mm * static_cast<double>(kPower.u) * u[kPower.u - 1] * v[kPower.v];
+  if constexpr (kPower.v > 0) shape.slope.y() += by_mm * static_cast<double>(kPower.v) * u[kPower.u] * v[kPower.v - 1];
+}
+
+template <std::size_t... kTerms>
+void add_terms(const double* terms_mm, const std::array<double, kOrders>& u, const std::array<double, kOrders>& v,
+               ShapeAt& shape, std::index_sequence<kTerms...> /*all*/) {
+  (add_term<kTerms>(terms_mm[kTerms], u, v, shape), ...);
+}
+
 }  // namespace
 
 ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::Vector2d& board_mm) {
@@ -31,14 +50,7 @@ ShapeAt shape_at(const double* terms_mm, const ShapeFrame& frame, const Eigen::V
   const Eigen::Vector2d within = at.cwiseMax(-kReach).cwiseMin(kReach);
   const auto u = powers_of(within.x()), v = powers_of(within.y());
   ShapeAt shape;
-  for (std::size_t i = 0; i < kShapeTerms; ++i) {
-    const Powers& power = kPowers[i];
-    const double term = u[power.u] * v[power.v];
-    shape.by_term(static_cast<Eigen::Index>(i)) = term;
-    shape.height_mm += terms_mm[i] * term;
-    if (power.u > 0) shape.slope.x() += terms_mm[i] * static_cast<double>(power.u) * u[power.u - 1] * v[power.v];
-    if (power.v > 0) shape.slope.y() += terms_mm[i] * static_cast<double>(power.v) * u[power.u] * v[power.v - 1];
-  }
+  add_terms(terms_mm, u, v, shape, std::make_index_sequence<kShapeTerms>());
   shape.slope = (within.array() == at.array()).select(shape.slope / frame.half_mm, 0);
   return shape;
 }
