@@ -68,27 +68,28 @@ Result<> ModelBuilder::set_background(std::string_view ply) {
   return {};
 }
 
-Result<Shot> ModelBuilder::read_shot(std::string_view ply) const {
+Result<std::vector<RangeImage>> ModelBuilder::read_images(std::string_view ply) const {
   const auto points = read_dense_ply(ply);
   if (!points) return tl::unexpected(points.error());
   auto images = range_images(*points, calibration_, options_.box);
   if (!images) return tl::unexpected(images.error());
   if (background_) background_->remove_from(*images);
-  return make_shot(std::move(*images));
+  return images;
 }
 
 Result<ModelBuilder::Added> ModelBuilder::add(const std::string& name, std::string_view ply) {
   names_.push_back(name);
   ++report_.frames;
-  auto shot = read_shot(ply);
+  auto images = read_images(ply);
   Added added;
-  if (shot) {
-    if (voxel_mm_ == 0) voxel_mm_ = voxel_for(*shot);
-    Tracked tracked = tracker_.add(names_.size() - 1, std::move(*shot));
+  if (images) {
+    Shot shot = make_shot(std::move(*images));
+    if (voxel_mm_ == 0) voxel_mm_ = voxel_for(shot);
+    Tracked tracked = tracker_.add(names_.size() - 1, std::move(shot));
     added = {std::move(tracked.refusal), tracked.found_again};
   } else {
-    if (shot.error().code == ErrorCode::kMismatch && report_.frames == 1) return tl::unexpected(shot.error());
-    added.refusal = shot.error().message;
+    if (images.error().code == ErrorCode::kMismatch && report_.frames == 1) return tl::unexpected(images.error());
+    added.refusal = images.error().message;
   }
   if (!added.refusal.empty()) report_.refused.push_back({name, added.refusal});
   return added;
@@ -127,7 +128,9 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell, const Adv
                                                               : "no frame can be used: " + report.refused.front().name +
                                                                     ": " + report.refused.front().reason);
   if (advance) advance(0, 0);
+  tracker_.mark_foreign_cells();
   report.adjustment = adjust(frames);
+  tracker_.mark_foreign_cells();
   report.turned_degrees = way_degrees(frames);
   report.voxel_mm = options_.voxel_mm.value_or(voxel_mm_);
   Volume volume({.voxel_mm = report.voxel_mm, .band_mm = 5 * report.voxel_mm});
@@ -143,9 +146,10 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell, const Adv
     }
     const auto ply = read(name);
     if (!ply) return tl::unexpected(ply.error());
-    const auto shot = read_shot(*ply);
-    if (!shot) return tl::unexpected(shot.error());
-    volume.add(*shot, frames[i].object_from_rig);
+    auto images = read_images(*ply);
+    if (!images) return tl::unexpected(images.error());
+    drop_foreign(*images, frames[i].shot);
+    volume.add(make_shot(std::move(*images)), frames[i].object_from_rig);
     report.fused.push_back({name, frames[i].object_from_rig, *fit});
   }
   if (advance) advance(frames.size(), frames.size());

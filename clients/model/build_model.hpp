@@ -101,7 +101,7 @@ class ModelBuilder {
   [[nodiscard]] Result<Model> finish(const Read& read, const Tell& tell, const Advance& advance = {});
 
  private:
-  [[nodiscard]] Result<Shot> read_shot(std::string_view ply) const;
+  [[nodiscard]] Result<std::vector<RangeImage>> read_images(std::string_view ply) const;
 
   Calibration calibration_;
   ModelOptions options_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
@@ -31,6 +32,12 @@ constexpr double kSigmas = 3;
 /// Distances that the motion causes at first, beside those of the sigmas.
 constexpr std::array kMotionMm{6.0, 1.5, 0.0};
 constexpr std::size_t kFewestPairs = 60;
+
+// Limits of a frame that fits, found on rendered busts: docs/model.md.
+constexpr double kFewestOverlap = 0.3;
+constexpr double kFewestAgreeing = 0.7;
+constexpr double kGreatestFit = 2.5;
+constexpr double kFewestDetermined = 0.002;
 
 /// Sums of one Gauss-Newton step about the shot's middle, in mm: turns are scaled by the shot's size.
 struct Step {
@@ -122,14 +129,30 @@ std::string to_string(const FreeMotion& motion) {
                      through.z());
 }
 
-std::optional<Alignment> align(const Shot& shot, std::span<const PlacedShot> references, const RigidTransform& start) {
+bool fits(const Alignment& alignment) {
+  return alignment.overlap >= kFewestOverlap && alignment.agreeing >= kFewestAgreeing && alignment.fit <= kGreatestFit;
+}
+
+std::string refusal_of(const Alignment& alignment) {
+  if (alignment.determined < kFewestDetermined)
+    return "the surface has too little relief: nothing determines " + to_string(alignment.least_determined);
+  if (alignment.overlap < kFewestOverlap)
+    return fmt::format("only {:.0f} % of what it shows lies on the surface so far", 100 * alignment.overlap);
+  if (alignment.agreeing < kFewestAgreeing || alignment.fit > kGreatestFit)
+    return fmt::format("it does not fit: its usual distance is {:.1f} sigma, and {:.0f} % agree within three",
+                       alignment.fit, 100 * alignment.agreeing);
+  return {};
+}
+
+std::optional<Alignment> align(const Shot& shot, std::span<const PlacedShot> references, const RigidTransform& start,
+                               std::size_t first) {
   constexpr double kStillMm = 0.001;
   const Aligner aligner(shot, references);
   RigidTransform pose = start;
-  for (const Level& level : kLevels) {
+  for (const Level& level : std::span(kLevels).subspan(first)) {
     for (int round = 0; round < level.rounds; ++round) {
       const Step step = aligner.step_at(pose, level, kMotionMm[level.level]);
-      if (step.pairs < (level.level == 0 ? kFewestPairs / 4 : kFewestPairs)) return std::nullopt;
+      if (step.pairs < kFewestPairs >> (2 - level.level)) return std::nullopt;
       // A motion that nothing determines stays as it is.
       const Matrix6 damped = step.information + 1e-6 * step.information.trace() / 6 * Matrix6::Identity();
       const Vector6 by = -damped.ldlt().solve(step.gradient);

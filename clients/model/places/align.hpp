@@ -46,12 +46,20 @@ struct Alignment {
 /// Moves a shot onto references: distances from points to planes, weighted by 1/sigma^2 of both, each point paired with
 /// what lies at its pixel in the reference (Blais and Levine 1995), from coarse to fine cells.
 /// @param start  object_from_rig to begin from
+/// @param first  coarsest level; a fine one needs a near start, and what moves otherwise pulls it less
 /// @return       nothing if too few cells meet
 /// @thread       reentrant
 [[nodiscard]] std::optional<Alignment> align(const Shot& shot, std::span<const PlacedShot> references,
-                                             const RigidTransform& start);
+                                             const RigidTransform& start, std::size_t first = 0);
 
-/// Calls visit(cell, reference cell, position of the cell in the reference's rig frame) for pairs at a level.
+/// Tells whether an alignment lays a shot onto its references, even if the surface slides on itself.
+[[nodiscard]] bool fits(const Alignment& alignment);
+
+/// The reason why an alignment does not put a shot into a model; empty if it does.
+[[nodiscard]] std::string refusal_of(const Alignment& alignment);
+
+/// Calls visit(cell, reference cell, position of the cell in the reference's rig frame) for pairs at a level. Foreign
+/// cells have none.
 /// @param gate_mm  the farthest that two surfaces of a pair may be apart
 template <class Visit>
 void visit_pairs(const Shot& shot, const RigidTransform& reference_from_rig, const Shot& reference, std::size_t level,
@@ -64,12 +72,13 @@ void visit_pairs(const Shot& shot, const RigidTransform& reference_from_rig, con
     const Eigen::Vector3f camera_translation = seen.image.camera_from_rig.translation.cast<float>();
     for (const SurfaceView& view : shot.views) {
       for (const SurfaceCell& cell : view.levels[level].cells) {
-        if (!(cell.sigma_mm > 0)) continue;
+        if (!(cell.sigma_mm > 0) || cell.foreign) continue;
         const Eigen::Vector3f place = rotation * cell.place_mm + translation;
         const Eigen::Vector3f in_camera = camera_rotation * place + camera_translation;
         if (!(in_camera.z() > 0)) continue;
         const Eigen::Vector2f pixel = seen.image.pixel_of(in_camera);
         const SurfaceCell* const other = seen.levels[level].at(pixel.x() + 0.5F, pixel.y() + 0.5F);
+        if (other && other->foreign) continue;  // it hides the object
         const bool near = other && std::abs(other->normal.dot(place - other->place_mm)) < gate_mm &&
                           (place - other->place_mm).squaredNorm() < 4 * gate_mm * gate_mm &&
                           other->normal.dot(rotation * cell.normal) > kAlike;

@@ -17,6 +17,7 @@ struct SurfaceCell {
   Eigen::Vector3f place_mm;
   Eigen::Vector3f normal;  ///< towards the camera
   float sigma_mm = 0;      ///< one standard deviation along the normal; 0: nothing was measured here
+  bool foreign = false;    ///< does not move with the object: mark_foreign()
 };
 
 /// Planes fitted to squares of `step` pixels. A cell that straddles an edge in depth has the surface of its middle.

@@ -9,8 +9,10 @@
 #include <numbers>
 #include <utility>
 
-#include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <Eigen/Geometry>
+
+#include "clients/model/places/two_bodies.hpp"
 
 namespace slsd::model {
 namespace {
@@ -21,28 +23,16 @@ constexpr double kKeyframeOverlap = 0.75;
 /// A frame is placed by so many of the latest keyframes.
 constexpr std::size_t kLatest = 3;
 constexpr std::size_t kFewestCells = 100;
+/// Rounds in which the marks of foreign cells grow.
+constexpr int kRounds = 3;
 
-// Limits of a frame that fits, found on rendered busts: docs/model.md.
-constexpr double kFewestOverlap = 0.3;
-constexpr double kFewestAgreeing = 0.7;
-constexpr double kGreatestFit = 2.5;
-constexpr double kFewestDetermined = 0.002;
+constexpr const char* kTwoBodies =
+    "two bodies in view move differently: show one alone, or leave out what stands still with --background or --box";
 
 }  // namespace
 
 double turn_degrees(const RigidTransform& a, const RigidTransform& b) {
   return Eigen::AngleAxisd(Eigen::Matrix3d(a.rotation.transpose() * b.rotation)).angle() * 180 / std::numbers::pi;
-}
-
-std::string refusal_of(const Alignment& alignment) {
-  if (alignment.determined < kFewestDetermined)
-    return "the surface has too little relief: nothing determines " + to_string(alignment.least_determined);
-  if (alignment.overlap < kFewestOverlap)
-    return fmt::format("only {:.0f} % of what it shows lies on the surface so far", 100 * alignment.overlap);
-  if (alignment.agreeing < kFewestAgreeing || alignment.fit > kGreatestFit)
-    return fmt::format("it does not fit: its usual distance is {:.1f} sigma, and {:.0f} % agree within three",
-                       alignment.fit, 100 * alignment.agreeing);
-  return {};
 }
 
 RigidTransform Tracker::expected() const {
@@ -107,19 +97,37 @@ Tracked Tracker::begin(const Shot& shot) const {
   return {alignment, {}, false};
 }
 
-Tracked Tracker::follow(const Shot& shot) const {
+bool Tracker::is_of_two(const Shot& shot, const RigidTransform& object_from_rig) const {
+  const ModelFrame& before = doubtful_ ? *doubtful_ : frames_.back();
+  const std::array starts{before.object_from_rig, expected(), object_from_rig};
+  return shows_two_bodies({&shot, object_from_rig}, {&before.shot, before.object_from_rig}, starts);
+}
+
+Tracked Tracker::follow(const Shot& shot) {
   const std::vector<PlacedShot> references = latest_keyframes();
   std::string refusal = "it meets nothing of the surface so far";
-  for (const RigidTransform& start : {expected(), frames_.back().object_from_rig}) {
-    const auto found = align(shot, references, start);
-    if (!found) continue;
-    refusal = refusal_of(*found);
-    if (refusal.empty()) return {found, {}, lost_};
+  double most = 0;
+  for (std::size_t first = 0; first < kCellSteps.size(); ++first) {
+    for (const RigidTransform& start : {expected(), frames_.back().object_from_rig}) {
+      const auto found = align(shot, references, start, first);
+      if (!found) continue;
+      std::string reason = refusal_of(*found);
+      const double agreeing = found->agreeing * static_cast<double>(found->pairs);
+      if (agreeing > most || reason.empty()) most = agreeing, candidate_ = found->object_from_rig;
+      if (reason.empty()) return {found, {}, lost_};
+      if (first == 0) refusal = std::move(reason);
+    }
   }
   if (step_degrees_ > 0) {
-    if (const auto found = step(shot)) return {found, {}, lost_};
+    if (const auto found = step(shot)) {
+      candidate_ = found->object_from_rig;
+      return {found, {}, lost_};
+    }
   }
-  if (const auto found = search(shot)) return {found, {}, true};
+  if (const auto found = search(shot)) {
+    candidate_ = found->object_from_rig;
+    return {found, {}, true};
+  }
   return {{}, std::move(refusal), false};
 }
 
@@ -128,7 +136,15 @@ Tracked Tracker::add(std::size_t number, Shot shot) {
     lost_ = !frames_.empty();
     return {{}, "it shows almost nothing: the object left the view, or the scan failed", false};
   }
+  candidate_.reset();
   Tracked tracked = frames_.empty() ? begin(shot) : follow(shot);
+  if (candidate_ && is_of_two(shot, *candidate_)) {
+    tracked = {{}, kTwoBodies, false};
+    for (SurfaceView& view : shot.views) view.image.drop_pixels();
+    doubtful_ = {number, std::move(shot), *candidate_};
+  } else {
+    doubtful_.reset();
+  }
   lost_ = !tracked.alignment && !frames_.empty();
   if (!tracked.alignment) return tracked;
   const Alignment& alignment = *tracked.alignment;
@@ -137,8 +153,56 @@ Tracked Tracker::add(std::size_t number, Shot shot) {
   const bool is_new =
       keyframes_.empty() || alignment.overlap < kKeyframeOverlap ||
       turn_degrees(frames_[keyframes_.back()].object_from_rig, alignment.object_from_rig) > kKeyframeDegrees;
-  if (is_new) keyframes_.push_back(frames_.size() - 1);
+  if (is_new) add_keyframe();
   return tracked;
+}
+
+void Tracker::add_keyframe() {
+  const ModelFrame& latest = frames_.back();
+  const PlacedShot placed{&latest.shot, latest.object_from_rig};
+  ShotEvidence evidence = no_evidence(latest.shot);
+  for (std::size_t i = 0; i < keyframes_.size(); ++i) {
+    ModelFrame& before = frames_[keyframes_[i]];
+    const PlacedShot other{&before.shot, before.object_from_rig};
+    weigh(evidence_[i], other, placed);
+    weigh(evidence, placed, other);
+    mark_foreign(before.shot, evidence_[i]);
+  }
+  mark_foreign(frames_.back().shot, evidence);
+  evidence_.push_back(std::move(evidence));
+  keyframes_.push_back(frames_.size() - 1);
+}
+
+void Tracker::mark_foreign_cells() {
+  const auto witnesses_of = [&](std::size_t frame) {
+    std::vector<PlacedShot> witnesses;
+    for (const std::size_t keyframe : keyframes_)
+      if (keyframe != frame) witnesses.push_back({&frames_[keyframe].shot, frames_[keyframe].object_from_rig});
+    return witnesses;
+  };
+  std::vector<ShotEvidence> evidence(frames_.size());
+  tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t i) {
+    const PlacedShot placed{&frames_[i].shot, frames_[i].object_from_rig};
+    evidence[i] = no_evidence(*placed.shot);
+    for (const PlacedShot& witness : witnesses_of(i)) weigh(evidence[i], placed, witness);
+  });
+  std::vector<std::size_t> marked;
+  for (std::size_t i = 0; i < frames_.size(); ++i)
+    if (mark_foreign(frames_[i].shot, evidence[i]) > 0) marked.push_back(i);
+  // What one frame marks confirms nothing in the next round.
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<std::vector<std::vector<std::size_t>>> grown(marked.size());
+    tbb::parallel_for(std::size_t{0}, marked.size(), [&](std::size_t i) {
+      const ModelFrame& frame = frames_[marked[i]];
+      grown[i] = grown_foreign({&frame.shot, frame.object_from_rig}, witnesses_of(marked[i]));
+    });
+    for (std::size_t i = 0; i < marked.size(); ++i) {
+      Shot& shot = frames_[marked[i]].shot;
+      for (std::size_t view = 0; view < shot.views.size(); ++view)
+        for (const std::size_t cell : grown[i][view]) shot.views[view].levels.back().cells[cell].foreign = true;
+      mark_coarse_cells(shot);
+    }
+  }
 }
 
 }  // namespace slsd::model

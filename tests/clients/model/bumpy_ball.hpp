@@ -60,9 +60,8 @@ inline RigidTransform rig_from_object(double turn_degrees, double tilt_degrees =
 /// A scan of the object. The errors along the rays have `sigma_mm` and are alike over some pixels, as those of dense
 /// clouds.
 inline std::vector<DensePoint> measure(const Distance& distance, const RigidTransform& rig_from_object, float sigma_mm,
-                                       unsigned seed) {
+                                       unsigned seed, const Lens& lens = test_calibration().cameras[0].lens) {
   constexpr int kAlikePx = 6;
-  const Lens lens = test_calibration().cameras[0].lens;
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
   const int columns = lens.width_px / kAlikePx + 2;
