@@ -87,22 +87,23 @@ Sums sum_up(const ImageView<T>& frame, double full, const PatternField& field, c
 
 }  // namespace
 
-void BlurMeter::add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
-                    const CellTask& task) {
-  if (task.patch.failed || !(task.patch.state.gain > 0)) return;
+std::optional<float> BlurMeter::add(const GreyView& frame, double full, const PatternField& field,
+                                    const AlignOptions& options, const CellTask& task) {
+  if (task.patch.failed || !(task.patch.state.gain > 0)) return std::nullopt;
   const Sums sums = std::visit([&](const auto& pixels) { return sum_up(pixels, full, field, options, task); }, frame);
   const Eigen::LDLT<Eigen::Matrix<float, kFitted, kFitted>> others(sums.normal);
-  if (others.info() != Eigen::Success || !others.isPositive()) return;
+  if (others.info() != Eigen::Success || !others.isPositive()) return std::nullopt;
   const Eigen::Matrix<float, kFitted, kChanges> explained = others.solve(sums.with_changes);
   const Eigen::Matrix<float, kChanges, kChanges> known = sums.changes - sums.with_changes.transpose() * explained;
   const Changes asked = sums.changes_right - explained.transpose() * sums.right;
   const float blur = known(kOfBlur, kOfBlur), both = known(kOfBlur, kOfTone);
-  if (!(blur > kKnownMin * sums.changes(kOfBlur, kOfBlur)) || !asked.allFinite()) return;
+  if (!(blur > kKnownMin * sums.changes(kOfBlur, kOfBlur)) || !asked.allFinite()) return std::nullopt;
   patches_.emplace_back(asked[kOfBlur] / blur, blur);
   // A wrong blur must not pass for a tone curve: it is eliminated, too.
   const float tone = known(kOfTone, kOfTone) - both * both / blur;
   if (tone > kKnownMin * sums.changes(kOfTone, kOfTone))
     tones_.emplace_back((asked[kOfTone] - both / blur * asked[kOfBlur]) / tone, tone);
+  return field.blur_sigma_px() * field.blur_sigma_px() + asked[kOfBlur] / blur;
 }
 
 std::optional<float> BlurMeter::weighted_median(Weighted& values) {

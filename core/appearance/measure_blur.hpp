@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/appearance/align_patches.hpp"
+#include "core/appearance/blurred_pattern.hpp"
 #include "core/appearance/tone_curve.hpp"
 
 namespace slsd {
@@ -24,8 +25,9 @@ class BlurMeter {
   void clear() { patches_.clear(), tones_.clear(); }
   /// Adds a patch that was aligned with the field.
   /// @param full  the level of a saturated pixel, see Censored
-  void add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
-           const CellTask& task);
+  /// @return the variance of the patch's blur, projector px^2; empty if it knows nothing of it
+  std::optional<float> add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
+                           const CellTask& task);
   /// Change of the variance, projector px^2: the median of the patches, weighted by what each knows. Empty without a
   /// patch that knows anything.
   [[nodiscard]] std::optional<float> change() { return weighted_median(patches_); }
@@ -50,41 +52,42 @@ struct BlurSeen {
   float tone_change = 0;               ///< see BlurMeter; 0 if no patch knows it
 };
 
-/// Finds the field of a frame's blur: from a usual blur, until the blur rests. If most patches fail at the usual blur,
+/// Finds a frame's blur, projector px: from a usual one, until the blur rests. If most patches fail at the usual blur,
 /// the search starts at the wider one where most are aligned.
 /// @param look  BlurSeen(const PatternField&)
 template <class Look>
-[[nodiscard]] std::shared_ptr<const PatternField> find_field(const PatternFields& fields, Look&& look) {
+[[nodiscard]] float find_blur(const PatternFields& fields, Look&& look) {
   constexpr int kRoundsMost = 8;
+  constexpr float kOnTheWay = 0.04F;  // nearer to its own blur, a frame needs no other field
   BlurSeen seen = look(fields.usual());
   if (2 * seen.aligned < seen.tried) {
     for (std::size_t rung = PatternFields::kUsualRung + 2; rung < PatternFields::kLadderPx.size(); rung += 2)
       if (const BlurSeen other = look(fields.rung(rung)); other.aligned > seen.aligned) seen = other;
   }
-  std::shared_ptr<const PatternField> field = fields.at(seen.blur_px), before;
+  std::shared_ptr<const PatternField> field = fields.at(seen.blur_px, kOnTheWay), before;
   for (int round = 0; round < kRoundsMost; ++round) {
-    auto next = fields.at(look(*field).blur_px);
+    seen = look(*field);
+    auto next = fields.at(seen.blur_px, kOnTheWay);
     // Between two fields, a blur may ask for each of them in turn.
     if (next == field || next == before) break;
     before = std::exchange(field, std::move(next));
   }
-  return field;
+  return seen.blur_px;
 }
 
-/// Finds the field and the camera's tone curve in turn, from a straight curve, until the curve rests.
+/// Finds the blur and the camera's tone curve in turn, from a straight curve, until the curve rests.
 /// @param develop  void(): makes the light of the frame, which look() looks at, by the present curve
-/// @param look     as for find_field()
+/// @param look     as for find_blur()
 template <class Develop, class Look>
-[[nodiscard]] std::shared_ptr<const PatternField> find_field_and_tone(const PatternFields& fields, ToneCurve& tone,
-                                                                      Develop&& develop, Look&& look) {
+[[nodiscard]] float find_blur_and_tone(const PatternFields& fields, ToneCurve& tone, Develop&& develop, Look&& look) {
   constexpr int kRoundsMost = 4;
   constexpr float kAtRest = 0.02F;
-  std::shared_ptr<const PatternField> field;
+  float blur_px = 0;
   tone.set_power(1);
   for (int round = 0; round < kRoundsMost; ++round) {
     develop();
     float change = 0;
-    field = find_field(fields, [&](const PatternField& tried) {
+    blur_px = find_blur(fields, [&](const PatternField& tried) {
       const BlurSeen seen = look(tried);
       change = seen.tone_change;
       return seen;
@@ -96,7 +99,19 @@ template <class Develop, class Look>
       break;
     }
   }
-  return field;
+  return blur_px;
+}
+
+/// Finds the pattern as a frame shows it, if its usual blur is known. An uneven blur is measured again with the fields
+/// that it asks for: the equations are linear only near a field's blur.
+/// @param look     BlurSeen(const BlurredPattern&)
+/// @param samples  std::span<const BlurSample>(): the blur at the patches of the last look
+template <class Look, class Samples>
+[[nodiscard]] BlurredPattern find_pattern(const PatternFields& fields, float blur_px, Look&& look, Samples&& samples) {
+  BlurredPattern pattern(fields, blur_px, samples());
+  if (pattern.levels() == 1) return pattern;
+  (void)look(pattern);
+  return {fields, blur_px, samples()};
 }
 
 }  // namespace slsd

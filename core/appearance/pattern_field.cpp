@@ -130,19 +130,21 @@ const PatternField& PatternFields::nearest(float blur_px) const {
   return rung(static_cast<std::size_t>(std::ranges::min_element(kLadderPx, {}, off) - kLadderPx.begin()));
 }
 
-std::shared_ptr<const PatternField> PatternFields::at(float blur_px) const {
-  constexpr float kStepsOfE = 100;
-  const float blur =
-      std::clamp(std::exp(std::round(kStepsOfE * std::log(blur_px)) / kStepsOfE), kBlurMinPx, kBlurMaxPx);
+std::shared_ptr<const PatternField> PatternFields::at(float blur_px, float share) const {
+  const float blur = std::clamp(std::exp(std::round(std::log(blur_px) / share) * share), kBlurMinPx, kBlurMaxPx);
+  constexpr std::size_t kCallsOfSomeFrames = 24;
   const std::lock_guard lock(mutex_);
-  const auto known = std::ranges::find(kept_, blur, [](const auto& field) { return field->blur_sigma_px(); });
+  const std::size_t call = calls_++;
+  std::erase_if(kept_, [&](const Kept& kept) { return call - kept.asked_for > kCallsOfSomeFrames; });
+  const auto known = std::ranges::find(kept_, blur, [](const Kept& kept) { return kept.field->blur_sigma_px(); });
   if (known != kept_.end()) {
     std::rotate(known, known + 1, kept_.end());
   } else {
     if (kept_.size() == kKept) kept_.erase(kept_.begin());
-    kept_.push_back(std::make_shared<const PatternField>(pattern_.view(), blur));
+    kept_.push_back({std::make_shared<const PatternField>(pattern_.view(), blur), 0});
   }
-  return kept_.back();
+  kept_.back().asked_for = call;
+  return kept_.back().field;
 }
 
 }  // namespace slsd

@@ -70,15 +70,15 @@ class PatternField {
   std::vector<std::uint32_t> samples_;
 };
 
-/// The pattern at any blur. Makes each field on first use: a ladder of blurs that stay, and between them the last few
-/// that were asked for.
+/// The pattern at any blur. Makes each field on first use: a ladder of blurs that stay, and between them those that
+/// were asked for lately.
 /// @thread thread-safe
 class PatternFields {
  public:
   static constexpr float kBlurMinPx = 0.35F, kBlurMaxPx = 2.8F;
   static constexpr std::array<float, 8> kLadderPx{0.42F, 0.55F, 0.72F, 0.95F, 1.25F, 1.65F, 2.15F, 2.8F};
   static constexpr std::size_t kUsualRung = 1;
-  static constexpr std::size_t kKept = 4;  ///< number of fields between those of the ladder
+  static constexpr std::size_t kKept = 8;  ///< largest number of fields between those of the ladder
 
   explicit PatternFields(Grey8 pattern) : pattern_(std::move(pattern)) {}
   /// Returns the field of the ladder that suits projectors and cameras in focus.
@@ -87,15 +87,20 @@ class PatternFields {
   [[nodiscard]] const PatternField& rung(std::size_t rung) const;
   /// Returns the field of the ladder with the nearest blur, a standard deviation in projector px.
   [[nodiscard]] const PatternField& nearest(float blur_px) const;
-  /// Returns the field at a blur, rounded to a hundredth of itself.
-  [[nodiscard]] std::shared_ptr<const PatternField> at(float blur_px) const;
+  /// Returns the field at a blur, rounded to a share of itself: blurs that differ by less share a field.
+  [[nodiscard]] std::shared_ptr<const PatternField> at(float blur_px, float share = 0.01F) const;
 
  private:
   Grey8 pattern_;
   mutable std::array<std::once_flag, kLadderPx.size()> made_;
   mutable std::array<std::optional<PatternField>, kLadderPx.size()> fields_;
-  mutable std::mutex mutex_;                                       // of kept_
-  mutable std::vector<std::shared_ptr<const PatternField>> kept_;  // the last one asked for comes last
+  struct Kept {
+    std::shared_ptr<const PatternField> field;
+    std::size_t asked_for;  // when, in calls of at()
+  };
+  mutable std::mutex mutex_;        // of those below
+  mutable std::vector<Kept> kept_;  // the last one asked for comes last
+  mutable std::size_t calls_ = 0;
 };
 
 }  // namespace slsd

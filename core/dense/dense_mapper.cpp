@@ -158,12 +158,14 @@ DenseFrame DenseMapper::develop(const DenseFrame& frame) {
 DenseFrame DenseMapper::find_pattern(const DenseFrame& frame) {
   DenseFrame light = frame;
   bool again = false;
-  field_ = find_field_and_tone(
+  const auto look = [&](const BlurredPattern& tried) {
+    grid_.find_epipolar_offset(light, tried, seeds_, std::exchange(again, true));
+    return grid_.look_at_blur(light, tried, seeds_);
+  };
+  const float blur_px = find_blur_and_tone(
       *fixed_->fields, tone_, [&] { light = develop(frame); },
-      [&](const PatternField& field) {
-        grid_.find_epipolar_offset(light, field, seeds_, std::exchange(again, true));
-        return grid_.look_at_blur(light, field, seeds_);
-      });
+      [&](const PatternField& even) { return look(BlurredPattern(even)); });
+  pattern_ = slsd::find_pattern(*fixed_->fields, blur_px, look, [&] { return grid_.blur_samples(); });
   return light;
 }
 
@@ -196,24 +198,23 @@ void DenseMapper::map_surface(const DenseFrame& seen, const PixelRectangle& with
     if (observer != nullptr) observer->stage_done(stage);
   };
   map_.resize(fixed_->geometry.camera.lens.width_px, fixed_->geometry.camera.lens.height_px);
-  const PatternField& field = *field_;
   if (refiner_.lattice().step > 1) {
-    grid_.grow_coarse(seen, field, seeds_, refiner_.lattice(), executor);
-    refiner_.refine(seen, field, grid_, executor);
+    grid_.grow_coarse(seen, pattern_, seeds_, refiner_.lattice(), executor);
+    refiner_.refine(seen, pattern_, grid_, executor);
   }
-  grid_.grow(seen, field, seeds_, executor);
+  grid_.grow(seen, pattern_, seeds_, executor);
   done(DenseStage::kGrow);
   const auto of_symbols = static_cast<std::ptrdiff_t>(seeds_.size());
   if (from != nullptr) seeds_.insert(seeds_.end(), from->found.begin(), from->found.end());
-  if (const auto found = search_.find(seen, field, grid_, executor); !found.empty()) {
-    grid_.grow_on(seen, field, found, executor);
+  if (const auto found = search_.find(seen, pattern_.usual(), grid_, executor); !found.empty()) {
+    grid_.grow_on(seen, pattern_, found, executor);
     seeds_.insert(seeds_.end(), found.begin(), found.end());
   }
-  if (next) follower_.keep(seen, field_, grid_, std::span(seeds_).subspan(of_symbols), executor);
+  if (next) follower_.keep(seen, pattern_, grid_, std::span(seeds_).subspan(of_symbols), executor);
   done(DenseStage::kSearch);
   grid_.fuse(executor);
   done(DenseStage::kFuse);
-  judge_.judge(seen, field, grid_, map_, within, executor);
+  judge_.judge(seen, pattern_, grid_, map_, within, executor);
   done(DenseStage::kJudge);
   occlusion_.drop_occluded(map_, executor);
   cleaner_.drop_unlit_boundaries(map_, fixed_->close_px);
@@ -237,7 +238,8 @@ void DenseMapper::map_part(const DenseFrame& seen, Executor& executor, DenseObse
   for (const SurfaceSeed& seed : seeds_)
     if (around.contains(static_cast<int>(seed.camera_px.x()), static_cast<int>(seed.camera_px.y())))
       mapper.seeds_.push_back({seed.camera_px - first, seed.plane});
-  mapper.field_ = field_;
+  mapper.pattern_ = pattern_;
+  mapper.pattern_.move_origin(first);
   mapper.tone_.set_power(tone_.power());
   EpipolarOffset offset = grid_.epipolar_offset();
   offset.middle_px -= first;
@@ -268,7 +270,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
   followed_ = from ? follower_.followed() : 0, across_px_ = from ? follower_.across_px() : 0;
   if (from) {
-    field_ = from->pattern_field;
+    pattern_ = from->pattern;
     grid_.set_epipolar_offset(from->epipolar);
   } else {
     if (!part_) grid_.clear();

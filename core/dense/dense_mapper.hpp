@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "core/appearance/pattern_field.hpp"
+#include "core/appearance/blurred_pattern.hpp"
 #include "core/appearance/tone_curve.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/decoder.hpp"
@@ -92,8 +92,8 @@ class DenseMapper {
   [[nodiscard]] const SurfaceGrid& grid() const { return grid_; }
   /// Number of nodes that the last frame took over from the previous one.
   [[nodiscard]] std::size_t followed_nodes() const { return followed_; }
-  /// Blur of the pattern in the last frame, projector px; 0 before the first.
-  [[nodiscard]] float blur_sigma_px() const { return field_ ? field_->blur_sigma_px() : 0; }
+  /// Usual blur of the pattern in the last frame, projector px; 0 before the first.
+  [[nodiscard]] float blur_sigma_px() const { return pattern_ ? pattern_.usual().blur_sigma_px() : 0; }
   /// Power of the light that the last frame's levels are, see ToneCurve.
   [[nodiscard]] float tone_power() const { return tone_.power(); }
   /// Offset of the pattern from its epipolar lines at the centre of the last frame, projector px.
@@ -123,7 +123,7 @@ class DenseMapper {
   MapCleaner cleaner_;
   std::vector<SurfaceSeed> seeds_;
   ToneCurve tone_;
-  std::shared_ptr<const PatternField> field_;  // the pattern as the last frame shows it
+  BlurredPattern pattern_;  // the pattern as the last frame shows it
   DenseMap map_;
   std::optional<PixelRectangle> part_;
   std::unique_ptr<DenseMapper> of_part_;  // of a camera that sees the part and some pixels around it

@@ -279,8 +279,8 @@ double GridFollower::still_share(const DenseFrame& frame, const SurfaceGrid& gri
   return looked_at == 0 ? 0 : static_cast<double>(still) / static_cast<double>(looked_at);
 }
 
-void GridFollower::keep(const DenseFrame& frame, const std::shared_ptr<const PatternField>& field,
-                        const SurfaceGrid& grid, std::span<const SurfaceSeed> found, Executor& executor) {
+void GridFollower::keep(const DenseFrame& frame, const BlurredPattern& pattern, const SurfaceGrid& grid,
+                        std::span<const SurfaceSeed> found, Executor& executor) {
   kept_.reset();
   std::size_t good = 0;
   for (const SurfaceNode& node : grid.nodes()) good += node.good;
@@ -288,12 +288,12 @@ void GridFollower::keep(const DenseFrame& frame, const std::shared_ptr<const Pat
   if (share < 1 - kStillMore && still_share(frame, grid) > share + kStillMore) {
     kept_ = std::make_shared<FollowedFrame>();
     copy_levels(frame.pixels, kept_->pixels);
-    kept_->full = frame.full, kept_->tone_power = frame.tone_power, kept_->pattern_field = field,
+    kept_->full = frame.full, kept_->tone_power = frame.tone_power, kept_->pattern = pattern,
     kept_->epipolar = grid.epipolar_offset();
     kept_->nodes.assign(grid.nodes().begin(), grid.nodes().end());
     for (const SurfaceSeed& seed : found)
       if (grid.good_at(seed.camera_px)) kept_->found.push_back(seed);
-    kept_->find_derivatives(*field, grid, executor);
+    kept_->find_derivatives(grid, executor);
     kept_->find_inverses(frame, grid, window_px_, executor);
   }
   copy_levels(frame.pixels, last_);

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "core/appearance/pattern_field.hpp"
+#include "core/appearance/blurred_pattern.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/followed_frame.hpp"
 #include "core/dense/surface_grid.hpp"
@@ -45,8 +45,8 @@ class GridFollower {
 
   /// Keeps a frame, once the grid has grown and before it is fused. It does so if more nodes stand still since the
   /// previous frame than continued. The next frames are then compared with this one.
-  /// @param field, found  see FollowedFrame
-  void keep(const DenseFrame& frame, const std::shared_ptr<const PatternField>& field, const SurfaceGrid& grid,
+  /// @param pattern, found  see FollowedFrame
+  void keep(const DenseFrame& frame, const BlurredPattern& pattern, const SurfaceGrid& grid,
             std::span<const SurfaceSeed> found, Executor& executor);
 
   /// Ends the frame: only nodes at which the map has a point continue.

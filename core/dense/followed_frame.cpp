@@ -48,9 +48,9 @@ struct BlockOf {
   float origin_u, origin_v, along_u, along_v;
   const std::uint32_t* samples;
   int field_width, field_height;
-  float slope_unit;
-  const float *x, *y;  // pixels relative to the node's
-  int count;           // a multiple of kLanes
+  float slope_unit, of_slope_unit;  // of a slope's bits; the derivatives in it, for one
+  const float *x, *y;               // pixels relative to the node's
+  int count;                        // a multiple of kLanes
 };
 
 /// Computes the derivatives of the light, and the light, in the units in which they are kept.
@@ -94,8 +94,8 @@ inline __attribute__((always_inline)) void derive_lanes(const BlockOf& in, std::
                              PatternField::kValueUnit +
                          (su * off_u + sv * off_v) * (in.slope_unit / kScale));
     }
-    store((slope_u * in.along_u + slope_v * in.along_v) * (1 / kOfSlopeUnit), along + first);
-    store((slope_v * in.along_u - slope_u * in.along_v) * (1 / kOfSlopeUnit), across + first);
+    store((slope_u * in.along_u + slope_v * in.along_v) * in.of_slope_unit, along + first);
+    store((slope_v * in.along_u - slope_u * in.along_v) * in.of_slope_unit, across + first);
     store(value * (1 / FollowedFrame::kLightUnit), light + first);
   }
 }
@@ -204,12 +204,12 @@ std::size_t FollowedFrame::bytes() const {
   return of(pixels) + of(nodes) + of(tried) + of(found) + of(along) + of(across) + of(light) + of(inverses);
 }
 
-void FollowedFrame::find_derivatives(const PatternField& field, const SurfaceGrid& grid, Executor& executor) {
+void FollowedFrame::find_derivatives(const SurfaceGrid& grid, Executor& executor) {
   const int stride = grid.stride_px();
   const int width = grid.frame_px().first, height = grid.frame_px().second;
   const std::size_t area = static_cast<std::size_t>(width) * height;
   along.assign(area, 0), across.assign(area, 0), light.assign(area, 0);
-  slope_unit = kOfSlopeUnit * field.slope_unit();
+  slope_unit = kOfSlopeUnit * pattern.field(0).slope_unit();  // the narrowest blur has the steepest slopes
   const auto count = static_cast<std::size_t>((stride * stride + kLanes - 1) / kLanes * kLanes);
   std::vector<float> xs(count, 0), ys(count, 0);
   const int before = grid.x_of(0);  // number of pixels of a node's block left of it
@@ -231,8 +231,9 @@ void FollowedFrame::find_derivatives(const PatternField& field, const SurfaceGri
       block.origin_u = static_cast<float>(map.origin_px.x() + PatternField::kBorderPx) - node->across * map.along.y();
       block.origin_v = static_cast<float>(map.origin_px.y() + PatternField::kBorderPx) + node->across * map.along.x();
       block.along_u = map.along.x(), block.along_v = map.along.y();
+      const PatternField& field = pattern.field(node->blur);
       block.samples = field.samples(), block.field_width = field.width(), block.field_height = field.height();
-      block.slope_unit = field.slope_unit();
+      block.slope_unit = field.slope_unit(), block.of_slope_unit = field.slope_unit() / slope_unit;
       block.x = xs.data(), block.y = ys.data(), block.count = static_cast<int>(count);
       Cloned<derive_lanes>::call(block, of_block[0], of_block[1], of_block[2]);
       const int left = grid.x_of(column) - before, top = grid.y_of(row) - before;

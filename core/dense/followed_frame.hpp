@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
+#include "core/appearance/blurred_pattern.hpp"
 #include "core/appearance/patch_map.hpp"
-#include "core/appearance/pattern_field.hpp"
 #include "core/dense/surface_grid.hpp"
 #include "core/executor.hpp"
 
@@ -18,8 +18,8 @@ namespace slsd {
 struct FollowedFrame {
   std::vector<std::uint16_t> pixels;
   double full = 0;
-  float tone_power = 1;                               ///< see DenseFrame
-  std::shared_ptr<const PatternField> pattern_field;  ///< the field that the nodes were aligned with
+  float tone_power = 1;    ///< see DenseFrame
+  BlurredPattern pattern;  ///< what the nodes were aligned with
   EpipolarOffset epipolar;
   std::vector<SurfaceNode> nodes;                  ///< good if they gave points
   std::vector<char> tried;                         ///< nodes that no plane fitted
@@ -31,8 +31,8 @@ struct FollowedFrame {
 
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
-  /// Finds `along`, `across` and `light` from the nodes.
-  void find_derivatives(const PatternField& field, const SurfaceGrid& grid, Executor& executor);
+  /// Finds `along`, `across` and `light` from the nodes and the pattern.
+  void find_derivatives(const SurfaceGrid& grid, Executor& executor);
   /// Finds `inverses` from these.
   void find_inverses(const DenseFrame& frame, const SurfaceGrid& grid, int window_px, Executor& executor);
 

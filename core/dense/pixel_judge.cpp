@@ -255,7 +255,7 @@ inline __attribute__((always_inline)) void sum_lanes(const Summing& in, const fl
 /// The pixels between four nodes.
 struct PixelJudge::Cell {
   const DenseFrame& frame;
-  const PatternField& field;
+  const BlurredPattern& pattern;
   const SurfaceGrid& grid;
   DenseMap& map;
   int column, row;               // place of its top left node
@@ -353,8 +353,9 @@ void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate,
   in.count = static_cast<int>(xs_.size());
   in.first_x = static_cast<float>(cell.left - options_.reach_px) - map.middle_px.x();
   in.first_y = static_cast<float>(cell.top - options_.reach_px) - map.middle_px.y();
-  in.samples = cell.field.samples(), in.field_width = cell.field.width(), in.field_height = cell.field.height();
-  in.slope_unit = cell.field.slope_unit();
+  const PatternField& field = cell.pattern.field(node.blur);
+  in.samples = field.samples(), in.field_width = field.width(), in.field_height = field.height();
+  in.slope_unit = field.slope_unit();
   in.gain = node.gain, in.gain_x = node.gain_x, in.gain_y = node.gain_y, in.offset = node.offset;
   in.full = static_cast<float>(cell.frame.full);
   in.entries = table_.entries(cell.frame.noise.at(node.offset + 0.5F * node.gain) / node.gain);
@@ -527,7 +528,7 @@ void PixelJudge::resize(const SurfaceGrid& grid, int workers) {
   }
 }
 
-void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, DenseMap& map,
+void PixelJudge::judge(const DenseFrame& frame, const BlurredPattern& pattern, const SurfaceGrid& grid, DenseMap& map,
                        const PixelRectangle& within, Executor& executor) {
   const int stride = grid.stride_px();
   resize(grid, executor.workers());
@@ -541,7 +542,7 @@ void PixelJudge::judge(const DenseFrame& frame, const PatternField& field, const
       const bool inside = column >= 0 && column + 1 < grid.columns();
       const CellKind kind = inside ? kinds[column] : CellKind::kApart;
       if (kind == CellKind::kClean) continue;
-      Cell cell{frame, field, grid, map, column, row, 0, 0, 0, 0};
+      Cell cell{frame, pattern, grid, map, column, row, 0, 0, 0, 0};
       cell.left = std::max(0, grid.x_of(column)), cell.top = top;
       cell.right = std::min(map.width, grid.x_of(column) + stride), cell.bottom = bottom;
       if (cell.left >= cell.right || !within.meets({cell.left, cell.top, cell.right, cell.bottom})) continue;

@@ -41,7 +41,7 @@ class PixelJudge {
 
   /// @param within  pixels that matter: elsewhere, cells of several surfaces have no points, and others are not
   /// reviewed
-  void judge(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, DenseMap& map,
+  void judge(const DenseFrame& frame, const BlurredPattern& pattern, const SurfaceGrid& grid, DenseMap& map,
              const PixelRectangle& within, Executor& executor);
 
  private:

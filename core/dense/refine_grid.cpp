@@ -172,33 +172,63 @@ bool GridRefiner::start_row(const DenseFrame& frame, const SurfaceGrid& grid, in
   return any;
 }
 
-void GridRefiner::take_group(SurfaceGrid& grid, int row, int group, const Scratch& scratch) const {
+namespace {
+
+/// A group without a node to sum up.
+constexpr std::uint8_t kNoBlur = 255;
+
+/// Finds the level of each group's blur, which is that of its first node with a start.
+void find_blurs(const BlurredPattern& pattern, const SurfaceGrid& grid, int row, const BlockRow& blocks,
+                std::vector<std::uint8_t>& blurs) {
+  blurs.assign(block_groups(grid.columns()), kNoBlur);
+  const float *const known = blocks.of(BlockRow::kKnown), *const inverse_depth = blocks.of(BlockRow::kInverseDepth);
+  for (std::size_t group = 0; group < blurs.size(); ++group) {
+    const int first = first_of_group(static_cast<int>(group), grid.columns());
+    for (int column = first; column < first + kEight; ++column) {
+      if (!(known[column] > 0)) continue;
+      const Eigen::Vector2f at(static_cast<float>(grid.x_of(column)), static_cast<float>(grid.y_of(row)));
+      blurs[group] = static_cast<std::uint8_t>(pattern.level_at(at, inverse_depth[column]));
+      break;
+    }
+  }
+}
+
+}  // namespace
+
+/// Takes the nodes of a group that its blur suits; others are left to SurfaceGrid::grow().
+void GridRefiner::take_group(const BlurredPattern& pattern, SurfaceGrid& grid, int row, int group, int blur,
+                             const Scratch& scratch) const {
   const int first = first_of_group(group, grid.columns());
   for (int lane = 0; lane < kEight; ++lane) {
     const PatchTask& task = scratch.tasks[lane];
     const std::size_t index = static_cast<std::size_t>(row) * grid.columns() + first + lane;
     if (task.failed || !(std::abs(task.moved) < kMovedMax) || good_[index] || grid.is_closed(index)) continue;
-    (void)grid.accept(task, grid.nodes()[index]);
+    const Eigen::Vector2f at(static_cast<float>(grid.x_of(first + lane)), static_cast<float>(grid.y_of(row)));
+    if (!pattern.suits(blur, at, static_cast<float>(task.map.reference_inverse_depth))) continue;
+    SurfaceNode& node = grid.nodes()[index];
+    if (grid.accept(task, node)) node.blur = static_cast<std::uint8_t>(blur);
   }
 }
 
-void GridRefiner::refine_rows(const DenseFrame& frame, const PatternField& field, SurfaceGrid& grid, int first, int end,
-                              Scratch& scratch) {
+void GridRefiner::refine_rows(const DenseFrame& frame, const BlurredPattern& pattern, SurfaceGrid& grid, int first,
+                              int end, Scratch& scratch) {
   const int reach = sizes_.reach(), around = 2 * reach + 1, groups = block_groups(grid.columns());
   scratch.rows.resize(around), scratch.needed.resize(around), scratch.around.resize(around);
+  scratch.blurs.resize(around);
   const auto place = [&](int row) { return static_cast<std::size_t>((row - first + reach) % around); };
   for (int row = first - reach; row < end + reach; ++row) {
     BlockRow& blocks = scratch.rows[place(row)];
     std::vector<char>& needed = scratch.needed[place(row)];
     start_row(frame, grid, row, scratch, blocks, needed);
-    scratch.wanted.assign(groups, 0);
-    for (int group = 0; group < groups; ++group) {
-      const float* known = blocks.of(BlockRow::kKnown) + first_of_group(group, grid.columns());
-      scratch.wanted[group] = std::any_of(known, known + kEight, [](float is) { return is > 0; });
+    std::vector<std::uint8_t>& blurs = scratch.blurs[place(row)];
+    find_blurs(pattern, grid, row, blocks, blurs);
+    for (int blur = 0; blur < pattern.levels(); ++blur) {
+      scratch.wanted.resize(groups);
+      std::ranges::transform(blurs, scratch.wanted.begin(), [&](std::uint8_t of) { return of == blur ? 1 : 0; });
+      if (std::ranges::count(scratch.wanted, 1) > 0)
+        sum_blocks(frame.pixels, frame.full, pattern.field(blur), SurfaceGrid::kAlign, sizes_, grid.places_of(row),
+                   scratch.wanted, blocks);
     }
-    if (std::ranges::count(scratch.wanted, 1) > 0)
-      sum_blocks(frame.pixels, frame.full, field, SurfaceGrid::kAlign, sizes_, grid.places_of(row), scratch.wanted,
-                 blocks);
     const int middle = row - reach;
     if (middle < first) continue;
     const std::vector<char>& to_fit = scratch.needed[place(middle)];
@@ -213,12 +243,13 @@ void GridRefiner::refine_rows(const DenseFrame& frame, const PatternField& field
     for (int group = 0; group < groups; ++group) {
       if (!to_fit[group]) continue;
       scratch.fitter.fit_group(SurfaceGrid::kAlign, group, scratch.tasks);
-      take_group(grid, middle, group, scratch);
+      take_group(pattern, grid, middle, group, scratch.blurs[place(middle)][group], scratch);
     }
   }
 }
 
-void GridRefiner::refine(const DenseFrame& frame, const PatternField& field, SurfaceGrid& grid, Executor& executor) {
+void GridRefiner::refine(const DenseFrame& frame, const BlurredPattern& pattern, SurfaceGrid& grid,
+                         Executor& executor) {
   if (lattice_.step == 1) return;
   while (scratch_.size() < static_cast<std::size_t>(executor.workers())) scratch_.emplace_back(sizes_);
   find_cells(grid);
@@ -227,7 +258,7 @@ void GridRefiner::refine(const DenseFrame& frame, const PatternField& field, Sur
   std::ranges::transform(grid.nodes(), good_.begin(), [](const SurfaceNode& node) { return node.good; });
   executor.run((grid.rows() + kPartRows - 1) / kPartRows, [&](int part, int worker) {
     const int first = part * kPartRows;
-    refine_rows(frame, field, grid, first, std::min(grid.rows(), first + kPartRows), scratch_[worker]);
+    refine_rows(frame, pattern, grid, first, std::min(grid.rows(), first + kPartRows), scratch_[worker]);
   });
 }
 

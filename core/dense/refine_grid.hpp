@@ -28,7 +28,7 @@ class GridRefiner {
   [[nodiscard]] const CoarseLattice& lattice() const { return lattice_; }
   /// Side of the windows of most nodes, rounded up to an odd number.
   [[nodiscard]] int window_px() const { return window_px_; }
-  void refine(const DenseFrame& frame, const PatternField& field, SurfaceGrid& grid, Executor& executor);
+  void refine(const DenseFrame& frame, const BlurredPattern& pattern, SurfaceGrid& grid, Executor& executor);
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
  private:
@@ -40,17 +40,19 @@ class GridRefiner {
     std::vector<const BlockRow*> around;
     std::vector<std::vector<char>> needed;  // for each row: the groups with nodes to fit
     std::vector<char> wanted, inside;
+    std::vector<std::vector<std::uint8_t>> blurs;  // for each row: the level of each group's blur
     std::vector<Edge> edges;
     BlockFitter fitter;
     std::array<PatchTask, kEight> tasks;
   };
   void find_cells(const SurfaceGrid& grid);
-  void refine_rows(const DenseFrame& frame, const PatternField& field, SurfaceGrid& grid, int first, int end,
+  void refine_rows(const DenseFrame& frame, const BlurredPattern& pattern, SurfaceGrid& grid, int first, int end,
                    Scratch& scratch);
   bool start_row(const DenseFrame& frame, const SurfaceGrid& grid, int row, Scratch& scratch, BlockRow& to,
                  std::vector<char>& needed) const;
   void interpolate(const SurfaceGrid& grid, int row, Scratch& scratch, BlockRow& to) const;
-  void take_group(SurfaceGrid& grid, int row, int group, const Scratch& scratch) const;
+  void take_group(const BlurredPattern& pattern, SurfaceGrid& grid, int row, int group, int blur,
+                  const Scratch& scratch) const;
 
   BlockSizes sizes_;
   CoarseLattice lattice_;

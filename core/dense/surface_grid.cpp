@@ -87,21 +87,39 @@ bool SurfaceGrid::begin(const DenseFrame& frame, const Attempt& attempt, PatchTa
   return true;
 }
 
-/// Steps until each fit has settled: from a neighbour's plane, one step is enough for most.
-void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const {
+/// Steps until each fit of some active tasks has settled: from a neighbour's plane, one step is enough for most.
+void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t first,
+                        std::size_t count) const {
+  const auto active = std::span(batch.active).subspan(first);
   for (int step = 0; step < kStepsMost && count > 0; ++step) {
-    const auto eight = [&](std::size_t first) {
-      return std::span(batch.active).subspan(first, std::min<std::size_t>(kEight, count - first));
+    const auto eight = [&](std::size_t from) {
+      return active.subspan(from, std::min<std::size_t>(kEight, count - from));
     };
     for (std::size_t i = 0; i < count; i += kEight) {
       if (step == 0 && i + kEight < count) fetch_windows(field, options_.window_px, eight(i + kEight));
       align_eight(frame.pixels, frame.full, field, kAlign, options_.window_px, eight(i));
     }
     const auto end = std::remove_if(
-        batch.active.begin(), batch.active.begin() + static_cast<std::ptrdiff_t>(count),
+        active.begin(), active.begin() + static_cast<std::ptrdiff_t>(count),
         [&](const PatchTask* task) { return task->failed || (task->settled && std::abs(task->moved) < kSettledPx); });
-    count = static_cast<std::size_t>(end - batch.active.begin());
-    for (std::size_t i = 0; i < count; ++i) batch.active[i]->settled = true;
+    count = static_cast<std::size_t>(end - active.begin());
+    for (std::size_t i = 0; i < count; ++i) active[i]->settled = true;
+  }
+}
+
+/// Aligns the active tasks, each with the field of its blur.
+void SurfaceGrid::align_by_blur(const DenseFrame& frame, const BlurredPattern& pattern, Batch& batch,
+                                std::size_t count) const {
+  const auto blur_of = [&](const PatchTask* task) {
+    return batch.blurs[static_cast<std::size_t>(task - batch.tasks.data())];
+  };
+  if (pattern.levels() > 1)
+    std::stable_sort(batch.active.begin(), batch.active.begin() + static_cast<std::ptrdiff_t>(count),
+                     [&](const PatchTask* a, const PatchTask* b) { return blur_of(a) < blur_of(b); });
+  for (std::size_t first = 0, end = 0; first < count; first = end) {
+    const std::uint8_t blur = blur_of(batch.active[first]);
+    while (end < count && blur_of(batch.active[end]) == blur) ++end;
+    align(frame, pattern.field(blur), batch, first, end - first);
   }
 }
 
@@ -132,7 +150,7 @@ bool SurfaceGrid::accept(const PatchTask& task, SurfaceNode& node) const {
 }
 
 /// Aligns every nth seed, at most a batch of them. @return number of tasks that began, at the batch's front
-std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const PatternField& field,
+std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const BlurredPattern& pattern,
                                     std::span<const SurfaceSeed> seeds, std::size_t first, std::size_t step,
                                     Batch& batch) {
   std::size_t count = 0;
@@ -143,35 +161,40 @@ std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const PatternField&
                 dy = static_cast<float>(y_of(index / columns_)) - seeds[i].camera_px.y();
     const SurfacePlane& plane = seeds[i].plane;
     const Attempt attempt{index, 0, {plane.at(dx, dy), plane.slope_x, plane.slope_y}, 0, 0, 0, 0, 0};
-    batch.tasks[count].settled = false;
-    if (begin(frame, attempt, batch.tasks[count])) ++count;
+    PatchTask& task = batch.tasks[count];
+    task.settled = false;
+    if (!begin(frame, attempt, task)) continue;
+    batch.blurs[count++] = static_cast<std::uint8_t>(pattern.level_at(task.map.middle_px, attempt.start.inverse_depth));
   }
   for (std::size_t i = 0; i < count; ++i) batch.active[i] = &batch.tasks[i];
-  align(frame, field, batch, count);
+  align_by_blur(frame, pattern, batch, count);
   return count;
 }
 
-BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const PatternField& field,
+BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const BlurredPattern& pattern,
                                    std::span<const SurfaceSeed> seeds) {
   const std::size_t step = (seeds.size() + kBatchNodes - 1) / kBatchNodes;
   if (batches_.empty()) batches_.resize(1);
   BlurSeen seen;
-  seen.tried = align_some(frame, field, seeds, step / 2, step, batches_[0]);
-  blur_meter_.clear();
+  seen.tried = align_some(frame, pattern, seeds, step / 2, step, batches_[0]);
+  blur_meter_.clear(), blur_samples_.clear();
   for (std::size_t i = 0; i < seen.tried; ++i) {
     SurfaceNode node;
     const PatchTask& task = batches_[0].tasks[i];
     if (!accept(task, node)) continue;
     ++seen.aligned;
-    blur_meter_.add(frame.pixels, frame.full, field, kAlign,
-                    {.patch = task, .window_px = options_.window_px, .square_half_px = kEverywherePx});
+    const PatternField& field = pattern.field(batches_[0].blurs[i]);
+    const auto variance =
+        blur_meter_.add(frame.pixels, frame.full, field, kAlign,
+                        {.patch = task, .window_px = options_.window_px, .square_half_px = kEverywherePx});
+    if (variance) blur_samples_.push_back({task.map.middle_px, node.plane.inverse_depth, *variance});
   }
-  seen.blur_px = changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
+  seen.blur_px = changed_blur_px(pattern.usual().blur_sigma_px(), blur_meter_.change().value_or(0));
   seen.tone_change = blur_meter_.tone_change().value_or(0);
   return seen;
 }
 
-void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternField& field,
+void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const BlurredPattern& pattern,
                                        std::span<const SurfaceSeed> seeds, bool again) {
   const Lens& lens = geometry_->camera.lens;
   if (batches_.empty()) batches_.resize(1);
@@ -185,7 +208,7 @@ void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const PatternFie
   for (int round = again ? 1 : 0; round < 2; ++round) {
     offsets_.clear();
     for (std::size_t first = step / 2; first < seeds.size(); first += step * kBatchNodes) {
-      const std::size_t count = align_some(frame, field, seeds, first, step, batch);
+      const std::size_t count = align_some(frame, pattern, seeds, first, step, batch);
       for (std::size_t i = 0; i < count; ++i) {
         SurfaceNode node;
         const PatchTask& task = batch.tasks[i];
@@ -269,8 +292,8 @@ void SurfaceGrid::forget_attempts() {
     if (attempts != kClosed) attempts = 0;
 }
 
-void SurfaceGrid::grow_coarse(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
-                              const CoarseLattice& lattice, Executor& executor) {
+void SurfaceGrid::grow_coarse(const DenseFrame& frame, const BlurredPattern& pattern,
+                              std::span<const SurfaceSeed> seeds, const CoarseLattice& lattice, Executor& executor) {
   next_.clear();
   const auto nearest = [&](int node, int count) {
     const int coarse = static_cast<int>(std::lround(static_cast<double>(node - lattice.first) / lattice.step));
@@ -285,25 +308,25 @@ void SurfaceGrid::grow_coarse(const DenseFrame& frame, const PatternField& field
     for (int column = 0; column < lattice.columns; ++column)
       if (const std::int32_t index = lattice.of(row) * columns_ + lattice.of(column); nodes_[index].good)
         offer_neighbours(index, lattice.step);
-  grow_fronts(frame, field, lattice.step, executor);
+  grow_fronts(frame, pattern, lattice.step, executor);
   forget_attempts();
 }
 
-void SurfaceGrid::grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+void SurfaceGrid::grow(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
                        Executor& executor) {
   next_.clear();
   for (const SurfaceSeed& seed : seeds) offer_seed(node_at(seed.camera_px), seed);
   for (std::size_t i = 0; i < nodes_.size(); ++i)
     if (nodes_[i].good) offer_neighbours(static_cast<std::int32_t>(i), 1);
-  grow_fronts(frame, field, 1, executor);
+  grow_fronts(frame, pattern, 1, executor);
 }
 
-void SurfaceGrid::grow_on(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+void SurfaceGrid::grow_on(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
                           Executor& executor) {
   forget_attempts();
   next_.clear();
   for (const SurfaceSeed& seed : seeds) offer_seed(node_at(seed.camera_px), seed);
-  grow_fronts(frame, field, 1, executor);
+  grow_fronts(frame, pattern, 1, executor);
 }
 
 BlockPlaces SurfaceGrid::places_of(int row) const {
@@ -316,7 +339,7 @@ BlockPlaces SurfaceGrid::places_of(int row) const {
           epipolar_};
 }
 
-void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field, int step, Executor& executor) {
+void SurfaceGrid::grow_fronts(const DenseFrame& frame, const BlurredPattern& pattern, int step, Executor& executor) {
   if (batches_.size() < static_cast<std::size_t>(executor.workers())) batches_.resize(executor.workers());
   while (!next_.empty()) {
     front_.swap(next_);
@@ -337,11 +360,17 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const PatternField& field
         PatchTask& task = batch.tasks[i];
         task.settled = front_[first + i].gain > 0;
         task.failed = !begin(frame, front_[first + i], task);
-        if (!task.failed) batch.active[active++] = &task;
+        if (task.failed) continue;
+        batch.blurs[i] =
+            static_cast<std::uint8_t>(pattern.level_at(task.map.middle_px, front_[first + i].start.inverse_depth));
+        batch.active[active++] = &task;
       }
-      align(frame, field, batch, active);
-      for (std::size_t i = 0; i < in_part; ++i)
-        accepted_[first + i] = accept(batch.tasks[i], nodes_[front_[first + i].node]);
+      align_by_blur(frame, pattern, batch, active);
+      for (std::size_t i = 0; i < in_part; ++i) {
+        SurfaceNode& node = nodes_[front_[first + i].node];
+        accepted_[first + i] = accept(batch.tasks[i], node);
+        node.blur = batch.blurs[i];
+      }
     });
     for (const Attempt& attempt : front_) pending_[attempt.node] = -1;
     constexpr std::size_t kAhead = 8;

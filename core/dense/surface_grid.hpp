@@ -12,6 +12,7 @@
 
 #include "core/appearance/align_blocks.hpp"
 #include "core/appearance/align_patches.hpp"
+#include "core/appearance/blurred_pattern.hpp"
 #include "core/appearance/measure_blur.hpp"
 #include "core/executor.hpp"
 #include "core/exposure/frame_noise.hpp"
@@ -45,6 +46,7 @@ struct SurfaceNode {
   float noise_px = 0, slope_noise = 0;                 ///< one standard deviation from the frame's noise
   float sigma_px = 0;                                  ///< all errors together, projector px
   float residual = 0;                                  ///< root mean square, of the gain
+  std::uint8_t blur = 0;                               ///< level of its blur, see BlurredPattern
   bool good = false;
 };
 
@@ -119,12 +121,15 @@ class SurfaceGrid {
   }
 
   /// Measures the blur of the frame at a sample of the seeds, see BlurMeter.
-  [[nodiscard]] BlurSeen look_at_blur(const DenseFrame& frame, const PatternField& field,
+  /// @param pattern  as far as it is known
+  [[nodiscard]] BlurSeen look_at_blur(const DenseFrame& frame, const BlurredPattern& pattern,
                                       std::span<const SurfaceSeed> seeds);
+  /// The blur at the samples of the last look_at_blur().
+  [[nodiscard]] std::span<const BlurSample> blur_samples() const { return blur_samples_; }
 
   /// Measures at some seeds how far the pattern lies off its epipolar lines; later alignments start there.
   /// @param again  starts from the present offset, which was measured in this frame, so that one round is enough
-  void find_epipolar_offset(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+  void find_epipolar_offset(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
                             bool again = false);
   [[nodiscard]] const EpipolarOffset& epipolar_offset() const { return epipolar_; }
   void set_epipolar_offset(const EpipolarOffset& offset) { epipolar_ = offset; }
@@ -168,12 +173,13 @@ class SurfaceGrid {
   [[nodiscard]] BlockPlaces places_of(int row) const;
 
   /// Grows over the nodes of a lattice alone, from the seeds and from its good nodes.
-  void grow_coarse(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+  void grow_coarse(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
                    const CoarseLattice& lattice, Executor& executor);
   /// Grows from the seeds and from nodes that have become good since clear().
-  void grow(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds, Executor& executor);
+  void grow(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
+            Executor& executor);
   /// Continues from more seeds; tries nodes again that failed from elsewhere.
-  void grow_on(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+  void grow_on(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
                Executor& executor);
   /// Fuses each node with its neighbours if they agree within their noise: they are then one smooth surface, and their
   /// mean is more exact than each. Flat surfaces thus get wide windows. A larger difference adds to sigma.
@@ -192,6 +198,7 @@ class SurfaceGrid {
   struct Batch {
     std::array<PatchTask, kBatchNodes> tasks;
     std::array<PatchTask*, kBatchNodes> active;
+    std::array<std::uint8_t, kBatchNodes> blurs;  // the level of each task's blur
   };
   [[nodiscard]] PatchMap map_of(const Eigen::Matrix3d& turned, const Eigen::Vector2d& camera_px,
                                 double inverse_depth) const {
@@ -204,13 +211,15 @@ class SurfaceGrid {
     return map;
   }
   [[nodiscard]] bool begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const;
-  void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t count) const;
-  std::size_t align_some(const DenseFrame& frame, const PatternField& field, std::span<const SurfaceSeed> seeds,
+  void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t first,
+             std::size_t count) const;
+  void align_by_blur(const DenseFrame& frame, const BlurredPattern& pattern, Batch& batch, std::size_t count) const;
+  std::size_t align_some(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
                          std::size_t first, std::size_t step, Batch& batch);
   void offer(const Attempt& attempt);
   void offer_seed(std::int32_t index, const SurfaceSeed& seed);
   void forget_attempts();
-  void grow_fronts(const DenseFrame& frame, const PatternField& field, int step, Executor& executor);
+  void grow_fronts(const DenseFrame& frame, const BlurredPattern& pattern, int step, Executor& executor);
   void offer_neighbours(std::int32_t index, int step);
   [[nodiscard]] std::int32_t node_at(const Eigen::Vector2f& camera_px) const;
 
@@ -226,6 +235,7 @@ class SurfaceGrid {
   std::vector<std::uint8_t> attempts_;  // for each node
   std::vector<Batch> batches_;          // one for each worker
   BlurMeter blur_meter_;
+  std::vector<BlurSample> blur_samples_;
   EpipolarOffset epipolar_;
   std::vector<Eigen::Vector3f> offsets_;  // for each seed: camera px, offset
 };

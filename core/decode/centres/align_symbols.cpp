@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
@@ -133,27 +135,47 @@ SymbolAligner::Developed SymbolAligner::develop(const Developed& frame, const Fr
   return light;
 }
 
-/// Aligns a sample of the symbols with a field, and measures their blur.
-BlurSeen SymbolAligner::look_at_blur(const GreyView& frame, double full, const PatternField& field) {
+/// Aligns cells, each with the field of its blur.
+void SymbolAligner::align_by_blur(const Developed& light, const BlurredPattern& pattern, std::span<CellTask> cells) {
+  if (pattern.levels() == 1) return align_cells(light.pixels, light.full, pattern.usual(), {}, cells);
+  for (int level = 0; level < pattern.levels(); ++level) {
+    const auto is_of_level = [&](const CellTask& cell) {
+      const PatchMap& map = cell.patch.map;
+      return pattern.level_at(map.middle_px, static_cast<float>(map.reference_inverse_depth)) == level;
+    };
+    of_blur_.clear();
+    std::ranges::copy_if(cells, std::back_inserter(of_blur_), is_of_level);
+    align_cells(light.pixels, light.full, pattern.field(level), {}, of_blur_);
+    auto aligned = of_blur_.begin();
+    for (CellTask& cell : cells)
+      if (is_of_level(cell)) cell = *aligned++;
+  }
+}
+
+/// Aligns a sample of the symbols with the pattern, and measures their blur.
+BlurSeen SymbolAligner::look_at_blur(const Developed& light, const BlurredPattern& pattern) {
   const std::size_t step = std::max<std::size_t>(1, cells_.size() / kBlurSamples);
-  sample_.clear(), blur_meter_.clear();
+  sample_.clear(), blur_meter_.clear(), blur_samples_.clear();
   for (std::size_t i = step / 2; i < cells_.size(); i += step) sample_.push_back(cells_[i]);
-  align_cells(frame, full, field, {}, sample_);
+  align_by_blur(light, pattern, sample_);
   BlurSeen seen{.tried = sample_.size()};
   for (const CellTask& cell : sample_) {
     if (cell.patch.failed || cell.patch.support < kWholeSupportMin) continue;
     ++seen.aligned;
-    blur_meter_.add(frame, full, field, {}, cell);
+    const PatchMap& map = cell.patch.map;
+    const auto inverse_depth = static_cast<float>(map.reference_inverse_depth);
+    const PatternField& field = pattern.field(pattern.level_at(map.middle_px, inverse_depth));
+    if (const auto variance = blur_meter_.add(light.pixels, light.full, field, {}, cell))
+      blur_samples_.push_back({map.middle_px, inverse_depth, *variance});
   }
-  seen.blur_px = changed_blur_px(field.blur_sigma_px(), blur_meter_.change().value_or(0));
+  seen.blur_px = changed_blur_px(pattern.usual().blur_sigma_px(), blur_meter_.change().value_or(0));
   seen.tone_change = blur_meter_.tone_change().value_or(0);
   return seen;
 }
 
 /// Tries the planes of the neighbours as starts. If part of a symbol is cut off, many planes nearly fit the rest; its
 /// neighbours' planes are better starts.
-void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Lattice& lattice,
-                                   const PatternField& field) {
+void SymbolAligner::try_neighbours(const Developed& light, const BlurredPattern& pattern, const Lattice& lattice) {
   const auto is_good = [](const PatchTask& patch) { return !patch.failed && patch.support >= kSupportWeak; };
   again_.clear(), again_for_.clear();
   for (std::size_t i = 0; i < cells_.size(); ++i) {
@@ -168,7 +190,7 @@ void SymbolAligner::try_neighbours(const GreyView& frame, double full, const Lat
       again_.back().patch.state = start;
     }
   }
-  align_cells(frame, full, field, {}, again_);
+  align_by_blur(light, pattern, again_);
   for (std::size_t k = 0; k < again_.size(); ++k) {
     CellTask& cell = cells_[again_for_[k]];
     if (!again_[k].patch.failed && again_[k].patch.support > cell.patch.support + 0.005F) cell = again_[k];
@@ -234,14 +256,17 @@ const std::vector<AlignedSymbol>& SymbolAligner::align(const GreyView& frame, do
     cells_.push_back(cell_of(lattice.symbols[i], rays[i], depths_mm[i]));
   if (cells_.empty()) return aligned_;
   Developed light{frame, full};
-  const auto field = find_field_and_tone(
+  const auto look = [&](const BlurredPattern& tried) { return look_at_blur(light, tried); };
+  const float blur_px = find_blur_and_tone(
       *fields_, tone_,
       [&] {
         light = develop({frame, full}, noise, lattice);
       },
-      [&](const PatternField& tried) { return look_at_blur(light.pixels, light.full, tried); });
-  align_cells(light.pixels, light.full, *field, {}, cells_);
-  try_neighbours(light.pixels, light.full, lattice, *field);
+      [&](const PatternField& even) { return look(BlurredPattern(even)); });
+  const BlurredPattern pattern =
+      find_pattern(*fields_, blur_px, look, [&] { return std::span<const BlurSample>(blur_samples_); });
+  align_by_blur(light, pattern, cells_);
+  try_neighbours(light, pattern, lattice);
   for (std::size_t i = 0; i < cells_.size(); ++i) {
     const LatticeSymbol& symbol = lattice.symbols[i];
     aligned_.push_back(point_of(lattice, i, rays[i], cells.pixel(symbol.row, symbol.column).cast<float>()));

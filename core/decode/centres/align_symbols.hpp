@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/appearance/align_patches.hpp"
+#include "core/appearance/blurred_pattern.hpp"
 #include "core/appearance/measure_blur.hpp"
 #include "core/appearance/pattern_field.hpp"
 #include "core/appearance/tone_curve.hpp"
@@ -60,8 +61,9 @@ class SymbolAligner {
   };
   [[nodiscard]] CellTask cell_of(const LatticeSymbol& symbol, const PixelRay& ray, double depth_mm) const;
   [[nodiscard]] Developed develop(const Developed& frame, const FrameNoise& noise, const Lattice& lattice);
-  [[nodiscard]] BlurSeen look_at_blur(const GreyView& frame, double full, const PatternField& field);
-  void try_neighbours(const GreyView& frame, double full, const Lattice& lattice, const PatternField& field);
+  [[nodiscard]] BlurSeen look_at_blur(const Developed& light, const BlurredPattern& pattern);
+  void align_by_blur(const Developed& light, const BlurredPattern& pattern, std::span<CellTask> cells);
+  void try_neighbours(const Developed& light, const BlurredPattern& pattern, const Lattice& lattice);
   [[nodiscard]] AlignedSymbol point_of(const Lattice& lattice, std::size_t index, const PixelRay& ray,
                                        const Eigen::Vector2f& projector_px) const;
   [[nodiscard]] float disagreement_px(const Lattice& lattice, std::size_t index) const;
@@ -71,10 +73,11 @@ class SymbolAligner {
   PatternOptions options_;
   float pitch_px_, half_px_;
   std::shared_ptr<const PatternFields> fields_;
-  std::vector<CellTask> cells_, sample_, again_;
+  std::vector<CellTask> cells_, sample_, again_, of_blur_;
   std::vector<std::size_t> again_for_;  // for each of again_: index of its symbol
   std::vector<AlignedSymbol> aligned_;
   BlurMeter blur_meter_;
+  std::vector<BlurSample> blur_samples_;
   ToneCurve tone_;
 };
 
