@@ -139,12 +139,12 @@ Tracked Tracker::add(std::size_t number, Shot shot) {
   candidate_.reset();
   Tracked tracked = frames_.empty() ? begin(shot) : follow(shot);
   if (candidate_ && is_of_two(shot, *candidate_)) {
-    tracked = {{}, kTwoBodies, false};
     for (SurfaceView& view : shot.views) view.image.drop_pixels();
     doubtful_ = {number, std::move(shot), *candidate_};
-  } else {
-    doubtful_.reset();
+    lost_ = !frames_.empty();
+    return {{}, kTwoBodies, false};
   }
+  doubtful_.reset();
   lost_ = !tracked.alignment && !frames_.empty();
   if (!tracked.alignment) return tracked;
   const Alignment& alignment = *tracked.alignment;
