@@ -369,7 +369,7 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const BlurredPattern& pat
       for (std::size_t i = 0; i < in_part; ++i) {
         SurfaceNode& node = nodes_[front_[first + i].node];
         accepted_[first + i] = accept(batch.tasks[i], node);
-        node.blur = batch.blurs[i];
+        if (accepted_[first + i]) node.blur = batch.blurs[i];
       }
     });
     for (const Attempt& attempt : front_) pending_[attempt.node] = -1;
