@@ -85,14 +85,12 @@ struct Fusing {
 /// share of sigma squared that remains.
 struct Fused {
   Lanes off, slope_x, slope_y, left, more;
-  Lanes bend_xx, bend_xy, bend_yy;
 };
 
 /// Sums over nodes: of their mean, and of the regressions of slopes by place along both axes.
 struct FuseSums {
   Lanes weights, values, slopes_x, slopes_y, squares, expected, count;
   Lanes w, x[2], xx[2], s[2], xs[2];
-  Lanes twist[2];  // of the slopes along one axis by place along the other
 
   inline __attribute__((always_inline)) void add_slopes(float at_x, float at_y, const Lanes& weight,
                                                         const Lanes& slope_x, const Lanes& slope_y) {
@@ -100,7 +98,6 @@ struct FuseSums {
     w += weight;
     x[0] += weight * at_x, xx[0] += weight * (at_x * at_x), s[0] += of_x, xs[0] += of_x * at_x;
     x[1] += weight * at_y, xx[1] += weight * (at_y * at_y), s[1] += of_y, xs[1] += of_y * at_y;
-    twist[0] += of_x * at_y, twist[1] += of_y * at_x;
   }
   inline __attribute__((always_inline)) void add(const FuseSums& more) {
     weights += more.weights, values += more.values, slopes_x += more.slopes_x, slopes_y += more.slopes_y;
@@ -108,18 +105,11 @@ struct FuseSums {
     for (int axis = 0; axis < 2; ++axis) {
       x[axis] += more.x[axis], xx[axis] += more.xx[axis];
       s[axis] += more.s[axis], xs[axis] += more.xs[axis];
-      twist[axis] += more.twist[axis];
     }
   }
   inline __attribute__((always_inline)) void bend(int axis, Lanes& bend, Lanes& spread) const {
     spread = xx[axis] - x[axis] * x[axis] / w;
     bend = (xs[axis] - x[axis] * s[axis] / w) / spread;
-  }
-  /// The change of the slope along an axis with the place along the other.
-  inline __attribute__((always_inline)) void twisted(int axis, Lanes& bend, Lanes& spread) const {
-    const int across = 1 - axis;
-    spread = xx[across] - x[across] * x[across] / w;
-    bend = (twist[axis] - x[across] * s[axis] / w) / spread;
   }
 };
 
@@ -170,19 +160,13 @@ inline __attribute__((always_inline)) void fuse_lanes(const Fusing& in, Fused& f
   // window's centre. Widely spaced slopes underestimate short waves more than close ones do; extrapolating from both
   // removes the loss. If noise hides that, use the bend of the wider regression, which covers long waves.
   Lanes lift = zero;
-  fused.bend_xy = zero;
   for (int axis = 0; axis < 2; ++axis) {
     Lanes near, wide, near_spread, wide_spread;
     rings[0].bend(axis, near, near_spread), rings[1].bend(axis, wide, wide_spread);
     near += in.beyond * (near - wide);
     take_noise_off(kOverlap[0] * (1 + in.beyond) * (1 + in.beyond), near_spread, near);
     take_noise_off(kOverlap[1], wide_spread, wide);
-    const Lanes bend = near * near > wide * wide ? near : wide;
-    (axis == 0 ? fused.bend_xx : fused.bend_yy) = bend;
-    lift += bend;
-    rings[1].twisted(axis, wide, wide_spread);
-    take_noise_off(kOverlap[1], wide_spread, wide);
-    fused.bend_xy += 0.5F * wide;
+    lift += near * near > wide * wide ? near : wide;
   }
   lift *= in.of_bend;
   const Lanes any = beside_count > zero ? one : zero;
@@ -269,8 +253,6 @@ void SurfaceGrid::fuse(Executor& executor) {
         if (!node.good) continue;
         node.plane.inverse_depth += fused.off[lane] * node.per_px;
         node.plane.slope_x = fused.slope_x[lane], node.plane.slope_y = fused.slope_y[lane];
-        node.bend_xx = fused.bend_xx[lane] * node.per_px, node.bend_yy = fused.bend_yy[lane] * node.per_px;
-        node.bend_xy = fused.bend_xy[lane] * node.per_px;
         *place(at_row, column + lane, kVariance) =
             fused.left[lane] * (node.sigma_px * node.sigma_px + fused.more[lane]);
       }

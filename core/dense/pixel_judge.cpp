@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <span>
@@ -34,8 +33,6 @@ constexpr float kEnclosedMin = -2;
 constexpr float kFirmMin = 2;
 /// Standard deviation to add if a plane is continued beyond its node to an edge, px.
 constexpr float kEdgePx = 0.03F;
-/// What a bend adds to a continued plane counts so many times in sigma: at outlines, the bend grows toward the edge.
-constexpr float kOfBend = 2;
 /// Planes that differ by less at a cell are the same candidate, px.
 constexpr float kSamePx = 0.08F;
 
@@ -462,13 +459,12 @@ void PixelJudge::choose(const Cell& cell, const Scratch& scratch) const {
       const SurfaceNode& node = *cell.candidates[best];
       const float dx = static_cast<float>(x) - cell.places[best].x(),
                   dy = static_cast<float>(y) - cell.places[best].y();
-      const float bend = node.bend_at(dx, dy), depth = 1 / (node.plane.at(dx, dy) + bend);
+      const float depth = 1 / node.plane.at(dx, dy);
       if (!(depth >= depth_min && depth <= depth_max)) {
         cell.map.pixels[pixel] = DensePixel::kOutOfDepthRange;
         continue;
       }
-      const float of_bend = kOfBend * bend / node.per_px;
-      const float sigma = std::sqrt(node.sigma_px * node.sigma_px + kEdgePx * kEdgePx + of_bend * of_bend +
+      const float sigma = std::sqrt(node.sigma_px * node.sigma_px + kEdgePx * kEdgePx +
                                     node.slope_noise * node.slope_noise * (dx * dx + dy * dy));
       cell.map.depth_mm[pixel] = depth;
       cell.map.sigma_mm[pixel] = node.per_px * depth * depth * sigma;

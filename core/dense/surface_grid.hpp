@@ -45,15 +45,9 @@ struct SurfaceNode {
   float support = 0;                                   ///< the share of its window that agrees with the pattern
   float noise_px = 0, slope_noise = 0;                 ///< one standard deviation from the frame's noise
   float sigma_px = 0;                                  ///< all errors together, projector px
-  float bend_xx = 0, bend_xy = 0, bend_yy = 0;         ///< second derivatives of the inverse depth, found by fuse()
   float residual = 0;                                  ///< root mean square, of the gain
   std::uint8_t blur = 0;                               ///< level of its blur, see BlurredPattern
   bool good = false;
-
-  /// What the bend adds to the plane's inverse depth.
-  [[nodiscard]] float bend_at(float dx, float dy) const {
-    return 0.5F * (bend_xx * dx * dx + bend_yy * dy * dy) + bend_xy * dx * dy;
-  }
 };
 
 /// One frame as the dense stages see it.

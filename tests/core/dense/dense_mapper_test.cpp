@@ -150,52 +150,6 @@ TEST(DenseMapper, SurfacesKeepTheirPixelsUpToTheEdgeBetweenThem) {
   EXPECT_LT(share(wrong, measured), 0.1);
 }
 
-/// A ball in front of a wall.
-std::optional<double> ball_and_wall(const Ray& ray) {
-  const Eigen::Vector3d to_middle = Eigen::Vector3d(0, 0, 2050) - ray.origin;
-  const double along = to_middle.dot(ray.direction), length = ray.direction.squaredNorm();
-  const double inside = along * along - length * (to_middle.squaredNorm() - 60 * 60);
-  return inside > 0 ? (along - std::sqrt(inside)) / length : plane({0, 0, 2150}, {0, 0, 1})(ray);
-}
-
-struct Errors {
-  double mean_mm = 0, over_sigma = 0;
-  std::size_t count = 0;
-};
-
-/// Errors on the ball where its normal makes such a cosine with the ray, without gross ones.
-Errors errors_on_ball(const DenseMap& map, const Seen& seen, double least_cosine, double most_cosine) {
-  Errors errors;
-  for (int y = 0; y < map.height; ++y) {
-    for (int x = 0; x < map.width; ++x) {
-      const std::size_t pixel = static_cast<std::size_t>(y) * map.width + x;
-      const Eigen::Vector3d ray = seen.rig.cameras[0].lens.undistort({x, y}).homogeneous();
-      const double depth_mm = *seen.surface({Eigen::Vector3d::Zero(), ray});
-      const Eigen::Vector3d normal = (depth_mm * ray - Eigen::Vector3d(0, 0, 2050)).normalized();
-      const double cosine = std::abs(normal.dot(ray.normalized()));
-      const double off = static_cast<double>(map.depth_mm[pixel]) - depth_mm;
-      if (depth_mm > 2100 || cosine < least_cosine || cosine > most_cosine || !map.measured(pixel) || std::abs(off) > 5)
-        continue;
-      errors.mean_mm += off, ++errors.count;
-      errors.over_sigma += std::pow(off / static_cast<double>(map.sigma_mm[pixel]), 2);
-    }
-  }
-  const auto count = static_cast<double>(std::max<std::size_t>(1, errors.count));
-  errors.mean_mm /= count, errors.over_sigma = std::sqrt(errors.over_sigma / count);
-  return errors;
-}
-
-// Planes that were continued by their tangents lay 0.08 mm before the ball, and 2.03 sigma off at its outline.
-TEST(DenseMapper, FollowsABodyThatTurnsAway) {
-  const Seen seen = see(ball_and_wall, draw_pattern(pattern()));
-  const DenseMap map = measure_by({.prune_px = 0}, seen.frame.view()).map;
-  const Errors steep = errors_on_ball(map, seen, 0.25, 0.35), outline = errors_on_ball(map, seen, 0.15, 0.25);
-  ASSERT_GT(steep.count, 1800U);
-  EXPECT_NEAR(steep.mean_mm, 0, 0.05);
-  ASSERT_GT(outline.count, 1000U);
-  EXPECT_LT(outline.over_sigma, 1.8);
-}
-
 TEST(DenseMapper, WithoutPruningItReachesFartherAndNearerToWrong) {
   DenseOptions all;
   all.prune_px = 0;
