@@ -113,9 +113,13 @@ void SurfaceGrid::align_by_blur(const DenseFrame& frame, const BlurredPattern& p
   const auto blur_of = [&](const PatchTask* task) {
     return batch.blurs[static_cast<std::size_t>(task - batch.tasks.data())];
   };
-  if (pattern.levels() > 1)
-    std::stable_sort(batch.active.begin(), batch.active.begin() + static_cast<std::ptrdiff_t>(count),
-                     [&](const PatchTask* a, const PatchTask* b) { return blur_of(a) < blur_of(b); });
+  if (pattern.levels() > 1) {
+    const auto unsorted = batch.active;
+    std::size_t sorted = 0;
+    for (int level = 0; level < pattern.levels(); ++level)
+      for (std::size_t i = 0; i < count; ++i)
+        if (blur_of(unsorted[i]) == level) batch.active[sorted++] = unsorted[i];
+  }
   for (std::size_t first = 0, end = 0; first < count; first = end) {
     const std::uint8_t blur = blur_of(batch.active[first]);
     while (end < count && blur_of(batch.active[end]) == blur) ++end;

@@ -8,6 +8,7 @@
 
 #include "tests/core/appearance/plain_light.hpp"
 #include "tests/core/dense/small_scene.hpp"
+#include "tests/drivers/allocations.hpp"
 
 namespace slsd {
 namespace {
@@ -98,6 +99,20 @@ TEST(DenseBlur, IsMeasuredAtEachDepth) {
     EXPECT_LT(near, 1.5 * near_even) << next;
     EXPECT_LT(far, 1.5 * far_even) << next;
   }
+}
+
+TEST(DenseBlur, AllocatesNothingAfterTheFirstFrames) {
+  const Grey16 frame =
+      exact_frame(column_and_wall, [](int, int, double depth_mm) { return depth_mm > 2100 ? 0.75 : 0.55; });
+  Decoder decoder = fresh_decoder();
+  DenseMapper mapper = fresh_mapper();
+  SerialExecutor serial;
+  ASSERT_TRUE(decoder.decode(frame.view(), kFull));
+  const DecodedSymbols symbols = decoder.symbols();
+  for (int i = 0; i < 2; ++i) (void)mapper.measure(frame.view(), kFull, symbols, serial);
+  const std::uint64_t before = allocations();
+  (void)mapper.measure(frame.view(), kFull, symbols, serial);
+  EXPECT_EQ(allocations(), before);
 }
 
 TEST(DenseBlur, IsMeasuredTowardTheCorners) {
