@@ -86,12 +86,12 @@ float BlurOverFrame::variance_at(const Eigen::Vector2f& camera_px, float inverse
 BlurredPattern::BlurredPattern(std::shared_ptr<const PatternField> even) : levels_(1), fields_{std::move(even)} {}
 
 BlurredPattern::BlurredPattern(const PatternFields& fields, float blur_px, std::span<const BlurSample> samples)
-    : BlurredPattern(fields.at(blur_px)) {
-  if (samples.size() < kSamplesLeast) return;
-  const BlurOverFrame blur(samples);
-  const float narrowest = log_blur(blur.least()), range = log_blur(blur.most()) - narrowest;
-  if (range < kUneven) return;
-  blur_ = blur;
+    : blur_(samples) {
+  const float narrowest = log_blur(blur_.least()), range = log_blur(blur_.most()) - narrowest;
+  if (samples.size() < kSamplesLeast || range < kUneven) {
+    levels_ = 1, fields_[0] = fields.at(blur_px);
+    return;
+  }
   // Levels that lie evenly, then each in the middle of its samples (Lloyd 1982).
   const int count = std::min(kLevelsMost, static_cast<int>(std::ceil(range / kUneven)));
   std::array<float, kLevelsMost> all{};
@@ -99,7 +99,6 @@ BlurredPattern::BlurredPattern(const PatternFields& fields, float blur_px, std::
   for (int level = 0; level < count; ++level)
     middles[level] = narrowest + range * (static_cast<float>(level) + 0.5F) / static_cast<float>(count);
   for (int pass = 0; pass < kPasses; ++pass) move_to_samples(samples, middles);
-  levels_ = 0;
   for (const float middle : middles) {
     auto field = fields.at(std::exp(middle), kRounded);
     if (levels_ > 0 && field == fields_[levels_ - 1]) continue;

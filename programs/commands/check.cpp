@@ -397,7 +397,8 @@ class Check {
       findings_.good(fmt::format(
           "{}, at {:.0f} mm: resolves parts from {:.1f} mm, and half the height of waves {:.1f} mm long; one px is "
           "{:.2f} mm of depth. A wall gives {} points of {} pixels in {:.0f} ms per frame, in {:.0f} ms in a stream of "
-          "a still scene. Memory: {:.0f} MB, {:.0f} MB shared by all decoders, and {:.0f} MB per cloud in progress",
+          "a still scene. Memory: {:.0f} MB, at most {:.0f} MB shared by all decoders, and {:.0f} MB per cloud in "
+          "progress",
           name, outlook.depth_mm, outlook.thinnest_part_mm, outlook.half_transfer_mm, outlook.mm_per_px, points, pixels,
           std::chrono::duration<double, std::milli>(least).count(),
           std::chrono::duration<double, std::milli>(still).count(), static_cast<double>(mapper.bytes()) / kMega,

@@ -60,7 +60,7 @@ Turn turn_once(SceneAt&& scene_at) {
   return done;
 }
 
-/// How many vertices lie farther than so much off the ball.
+/// Number of vertices farther than so much off the ball.
 std::size_t farther_than(const Mesh& mesh, float mm) {
   return static_cast<std::size_t>(std::ranges::count_if(mesh.vertices_mm, [&](const Eigen::Vector3f& vertex) {
     return std::abs(off_ball_mm(vertex - kMiddle.cast<float>())) > mm;
