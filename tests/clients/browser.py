@@ -5,6 +5,7 @@ one: each begins without a page, cookies, cache and complaints."""
 import atexit
 import base64
 import json
+import re
 import shutil
 import socket
 import subprocess
@@ -91,17 +92,19 @@ class Browser:
         element = self.ask("POST", self.session + "/element", {"using": "css selector", "value": selector})
         self.ask("POST", f"{self.session}/element/{next(iter(element.values()))}/click", {})
 
-    def click_at(self, selector, x, y):
-        """At so many pixels from the upper left corner of an element, as a hand does."""
-        left, top = self.run("""
+    def drag(self, selector, begin, end):
+        """With the mouse, as a hand does, between pixels from the upper left corner of an element. The element may move."""
+        element, x, y = self.run("""
             const element = document.querySelector(arguments[0]);
             element.scrollIntoView({block: "center"});
-            const place = element.getBoundingClientRect();
-            return [place.left, place.top];""", selector)
+            const {left, top, right, bottom} = element.getBoundingClientRect();
+            return [element, left - (Math.max(0, left) + Math.min(innerWidth, right)) / 2,
+                    top - (Math.max(0, top) + Math.min(innerHeight, bottom)) / 2];""", selector)
+        moves = [{"type": "pointerMove", "duration": 0, "origin": element, "x": round(x + place[0]), "y": round(y + place[1])}
+                 for place in (begin, end)]
         self.ask("POST", self.session + "/actions", {"actions": [
-            {"type": "pointer", "id": "mouse", "actions": [
-                {"type": "pointerMove", "duration": 0, "x": round(left + x), "y": round(top + y)},
-                {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0}]}]})
+            {"type": "pointer", "id": "mouse", "actions": [moves[0], {"type": "pointerDown", "button": 0}, moves[1],
+                                                           {"type": "pointerUp", "button": 0}]}]})
 
     def key(self, key):
         self.ask("POST", self.session + "/actions", {"actions": [
@@ -126,10 +129,12 @@ class Browser:
         shot = self.devtools("Page.captureScreenshot", format="png", captureBeyondViewport=True)
         file.write_bytes(base64.b64decode(shot["data"]))
 
-    def complaints(self):
-        """What the browser wrote to its console as an error: refused by the policy, or thrown."""
+    def complaints(self, expected=None):
+        """What the browser wrote to its console as an error: refused by the policy, or thrown; then what the page says.
+        Errors that match an expected pattern are left out."""
         log = self.ask("POST", self.session + "/se/log", {"type": "browser"})
-        return [entry["message"] for entry in log if entry["level"] == "SEVERE"]
+        errors = [entry["message"] for entry in log if entry["level"] == "SEVERE" and not (expected and re.search(expected, entry["message"]))]
+        return errors and [*errors, self.run("return document.body.innerText;")]
 
     def __enter__(self):
         return self

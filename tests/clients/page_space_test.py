@@ -201,17 +201,12 @@ class Space(unittest.TestCase):
         self.assertEqual(self.browser.complaints(), [])
 
     def drag(self, selector, begin, end):
-        """From one pixel of a canvas to another, with the mouse."""
+        """From one pixel of a canvas to another."""
         places = self.browser.run("""
-            const [name, ...pixels] = arguments, canvas = document.querySelector(name);
-            canvas.scrollIntoView({block: "center"});
-            const place = canvas.getBoundingClientRect();
-            return pixels.map(([u, v]) => [Math.round(place.left + (u + 0.5) / canvas.width * place.width),
-                                           Math.round(place.top + (v + 0.5) / canvas.height * place.height)]);""", selector, begin, end)
-        moves = [{"type": "pointerMove", "duration": 0, "x": x, "y": y} for x, y in places]
-        self.browser.ask("POST", self.browser.session + "/actions", {"actions": [
-            {"type": "pointer", "id": "mouse", "actions": [moves[0], {"type": "pointerDown", "button": 0}, moves[1],
-                                                           {"type": "pointerUp", "button": 0}]}]})
+            const [name, ...pixels] = arguments, canvas = document.querySelector(name), place = canvas.getBoundingClientRect();
+            return pixels.map(([u, v]) => [(u + 0.5) / canvas.width * place.width, (v + 0.5) / canvas.height * place.height]);""",
+                                  selector, begin, end)
+        self.browser.drag(selector, *places)
 
     def box(self):
         return self.browser.run("return partOfScan().box ?? null;")
@@ -318,6 +313,33 @@ class Space(unittest.TestCase):
             self.assertEqual(client.call("settings")[0]["set"]["cloud"], {"box": [-1000, -1000, 100, 1000, 1000, 2100], "box_frame": "rig"})
             self.assertEqual(client.call("scan", density="pixels", timeout_ms=600000)[0]["points"], count)
         self.assertEqual(self.note(), "Every scan measures this box alone.")
+        self.assertEqual(self.browser.complaints(), [])
+
+    def test_a_status_from_before_a_change_is_not_shown(self):
+        """An answer that is on its way while the page sets a box."""
+        self.open()
+        self.browser.run("""
+            const fetched = window.fetch;
+            window.held = [];
+            window.fetch = async (path, options) => {
+              const answer = await fetched(path, options);
+              if (path === "api/status" && held.length === 0) await new Promise((done) => held.push(done));
+              return answer;
+            };""")
+        self.browser.wait("held.length === 1", "no status was asked for")
+        self.browser.click("#box summary")
+        box = [-100, -100, 100, 100, 100, 2100]
+        self.set_box(box)
+        self.browser.click("#box-for-all")
+        self.browser.wait("boxChosen === null", "it is not set")
+        self.assertEqual(self.browser.run("""
+            const boxes = [], follow = followPart;
+            followPart = (part) => { follow(part); boxes.push(partOfService.box); };
+            held.push(boxes);
+            held[0]();
+            return partOfService.box;"""), box)
+        self.browser.wait("held[1].length > 1", "no more statuses")
+        self.assertEqual(self.browser.run("return held[1].slice(0, 2);"), [box, box])
         self.assertEqual(self.browser.complaints(), [])
 
     def test_a_box_and_a_chosen_preset_do_not_mix(self):

@@ -109,7 +109,7 @@ async function followCalibration() {
   for (;; await pause(wasUnderWay ? kLookPause : kIdlePause)) {
     if (document.hidden || !(isShown("calibrate") || wasUnderWay) || !mayAdminister) continue;
     try {
-      const told = await (await ask("api/calibration")).json();
+      const told = await askState("api/calibration");
       if (told.number !== number) showSession(told);
       number = told.number;
       wasUnderWay = told.under_way;

@@ -237,7 +237,7 @@ async function followHandEye() {
   for (;; await pause(kHandEyePause)) {
     if (document.hidden || !$("hand-eye").open || !isShown("hand-eye") || $("take-look").dataset.busy === "yes") continue;
     try {
-      showHandEye(await (await ask("api/hand_eye")).json());
+      showHandEye(await askState("api/hand_eye"));
       say("hand-eye", null);
     } catch (error) {
       say("hand-eye", error);

@@ -203,7 +203,7 @@ async function followModel() {
   for (;; await pause(modelRuns() ? kModelPause : kModelIdlePause)) {
     if (document.hidden || !isShown("model")) continue;
     try {
-      showModel(await (await ask("api/model")).json());
+      showModel(await askState("api/model"));
       await drawModel();
       say("model", null);
     } catch (error) {

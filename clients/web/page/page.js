@@ -37,6 +37,9 @@ function sessionKey() {
   }
 }
 
+// How many changes this page has asked for.
+let changes = 0;
+
 const noAnswer = () => new Refused(0, {name: "no_page_service", message: "slsd-web does not answer: check that it is running"});
 
 // Names are relative: the page may lie below any path of a proxy.
@@ -54,6 +57,15 @@ async function ask(path, body, timeout = kTimeout) {
     throw refused;
   } finally {
     clearTimeout(timer);
+    if (body !== undefined) ++changes;
+  }
+}
+
+// What the page follows. An answer that a change overtook is asked for again: it may tell what was before.
+async function askState(path, timeout) {
+  for (;;) {
+    const before = changes, told = await (await ask(path, undefined, timeout)).json();
+    if (changes === before) return told;
   }
 }
 
@@ -199,7 +211,7 @@ async function followStatus() {
   for (;; await pause(kStatusPause)) {
     if (document.hidden) continue;
     try {
-      showStatus(await (await ask("api/status", undefined, kStatusTimeout)).json());
+      showStatus(await askState("api/status", kStatusTimeout));
       if ($("login").open) welcome();  // let in by another tab
       else if (complaints.has("camera") && !$("camera-live").checked) showPicture();  // it failed by itself, and is tried again
     } catch (error) {

@@ -32,7 +32,7 @@ function showPresets() {
 }
 
 async function readPresets() {
-  ({presets, in_force: presetInForce} = await (await ask("api/presets")).json());
+  ({presets, in_force: presetInForce} = await askState("api/presets"));
   if (presetChosen === presetInForce) presetChosen = null;
   showPresets();
 }
