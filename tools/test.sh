@@ -5,6 +5,7 @@
 
 # run_tests PRESET [OPTION OF CTEST...]: runs three tests per processor, because many wait more than they work; two if
 # they are instrumented and work longer. Reports skipped tests; in CI (CI=true) only those of tests/skips.txt may skip.
+# Ends with what failed tests printed.
 run_tests() {
   local preset=$1 results=$PWD/build/$1/tests.xml status=0 per_processor=2
   [ "$preset" != release ] || per_processor=3
@@ -13,6 +14,7 @@ run_tests() {
   rm -f "$results"
   ctest --preset "$preset" --parallel $((per_processor * $(nproc))) --output-junit "$results" --test-output-size-passed 1000000 "$@" || status=$?
   [ ! -e "$results" ] || tests/skips.py "$results" || status=1
+  [ ! -e "$results" ] || tests/failures.py "$results"
   return $status
 }
 
