@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "clients/model/live_clouds.hpp"
 
+#include <sys/stat.h>
+
 #include <cerrno>
 #include <cstdlib>
 #include <system_error>
@@ -31,6 +33,24 @@ Result<path> make_temporary_folder() {
   std::string name = (parent / "slsd-model-XXXXXX").string();
   if (::mkdtemp(name.data()) == nullptr) return fail_system(errno, "cannot create a folder", name);
   return path(name);
+}
+
+/// The room on the disk that the files of a folder take.
+std::uintmax_t disk_bytes(const path& folder) {
+  constexpr std::uintmax_t kBlockBytes = 512;
+  std::uintmax_t bytes = 0;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    struct stat about {};
+    if (::stat(at->path().c_str(), &about) == 0) bytes += kBlockBytes * static_cast<std::uintmax_t>(about.st_blocks);
+  }
+  return bytes;
+}
+
+bool on_one_disk(const path& a, const path& b) {
+  struct stat of_a {
+  }, of_b{};
+  return ::stat(a.c_str(), &of_a) == 0 && ::stat(b.c_str(), &of_b) == 0 && of_a.st_dev == of_b.st_dev;
 }
 
 /// The result of a reply, or its error as a value.
@@ -109,6 +129,25 @@ Result<std::string> LiveClouds::read(const std::string& name) const {
 
 Result<> LiveClouds::finish() {
   return write_file_atomically(folder_ / "recording.json", json{{"scans", kept_}}.dump() + "\n");
+}
+
+bool LiveClouds::make_room(const path& file, std::uintmax_t bytes) {
+  std::error_code error;
+  if (!temporary_ || std::filesystem::is_symlink(file, error)) return false;
+  const path place = file.has_parent_path() ? file.parent_path() : path(".");
+  const auto space = std::filesystem::space(place, error);
+  if (error || !on_one_disk(place, folder_)) return false;
+  // A limit on the user's files, and no full disk, leaves room for the file.
+  const std::uintmax_t needed = bytes + bytes / 16;
+  if (space.available >= needed || space.available + disk_bytes(folder_ / "clouds") < needed) return false;
+  return std::filesystem::remove_all(folder_ / "clouds", error) > 0 && !error;
+}
+
+path LiveClouds::keep_folder() {
+  std::error_code error;
+  if (!std::filesystem::exists(folder_ / "clouds", error)) return {};
+  temporary_ = false;
+  return folder_;
 }
 
 }  // namespace slsd::model

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -45,6 +46,12 @@ class LiveClouds {
   [[nodiscard]] Result<std::string> read(const std::string& name) const;
   /// Completes the folder as a recording. @errors as keep()
   [[nodiscard]] Result<> finish();
+
+  /// Gives the room of temporary clouds on a full disk to a file. Removes them only if the file then fits.
+  /// @return whether they were removed
+  [[nodiscard]] bool make_room(const std::filesystem::path& file, std::uintmax_t bytes);
+  /// Keeps the folder, also a temporary one. @return it; empty: its clouds are removed
+  [[nodiscard]] std::filesystem::path keep_folder();
 
  private:
   LiveClouds(Connection connection, Calibration calibration, std::filesystem::path folder, bool temporary);

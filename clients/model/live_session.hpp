@@ -37,6 +37,7 @@ class LiveSession {
   [[nodiscard]] std::size_t placed() const { return builder_.placed(); }
   /// Builds the model of the clouds so far. @errors as ModelBuilder::finish()
   [[nodiscard]] Result<Model> finish(const Advance& advance);
+  [[nodiscard]] LiveClouds& clouds() { return clouds_; }
 
  private:
   using Clock = std::chrono::steady_clock;

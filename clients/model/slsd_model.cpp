@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include <slsd/connection.hpp>
 
 #include "clients/model/build_model.hpp"
+#include "clients/model/live_clouds.hpp"
 #include "clients/model/live_session.hpp"
 #include "clients/model/mesh/mesh_3mf.hpp"
 #include "clients/model/progress/progress.hpp"
@@ -88,26 +90,53 @@ struct Options {
   bool json = false, progress = false;
 };
 
-Result<> write_model(const std::filesystem::path& file, const Mesh& mesh, const std::string& title) {
+/// @param clouds  which may give their room to the model; null: none
+Result<> write_model(const std::filesystem::path& file, const Mesh& mesh, const std::string& title,
+                     model::LiveClouds* clouds) {
   const std::string extension = lower_extension(file);
   const auto bytes =
       extension == k3mf ? model::write_3mf(mesh, title) : write_mesh(mesh, *mesh_format(extension.substr(1)), title);
   if (!bytes) return tl::unexpected(bytes.error());
-  return write_file_atomically(file, *bytes);
+  auto written = write_file_atomically(file, *bytes);
+  if (!written && written.error().code == ErrorCode::kNoSpace && clouds && clouds->make_room(file, bytes->size()))
+    written = write_file_atomically(file, *bytes);
+  return written;
 }
 
-/// Writes the model and its report. @return the exit status
-int deliver(const Options& options, const Result<model::Model>& built, const std::string& subject,
-            model::Progress& progress) {
-  if (!built) return progress.fail(built.error());
-  for (const std::filesystem::path& file : options.outputs)
-    if (auto written = write_model(file, built->mesh, "slsd-model of " + subject); !written)
-      return progress.fail(written.error());
-  progress.finish(built->mesh);
-  if (options.progress) return progress.report(to_json(built->report, built->mesh)) ? 0 : 1;
+/// Writes the model into each file. One that cannot be written keeps no other from it.
+Result<> write_models(const Options& options, const Mesh& mesh, const std::string& subject, model::Progress& progress,
+                      model::LiveClouds* clouds) {
+  Result<> all;
+  for (const std::filesystem::path& file : options.outputs) {
+    auto written = write_model(file, mesh, "slsd-model of " + subject, clouds);
+    if (written) continue;
+    if (!all) progress.say(to_string(all.error()));
+    all = std::move(written);
+  }
+  return all;
+}
+
+bool print_report(const Options& options, const model::Model& made, model::Progress& progress) {
+  if (options.progress) return progress.report(to_json(made.report, made.mesh));
   const std::string report =
-      options.json ? to_json(built->report, built->mesh).dump() + "\n" : to_text(built->report, built->mesh);
-  return std::fputs(report.c_str(), stdout) < 0 || std::fflush(stdout) != 0 ? 1 : 0;
+      options.json ? to_json(made.report, made.mesh).dump() + "\n" : to_text(made.report, made.mesh);
+  return std::fputs(report.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
+}
+
+/// Writes the model and its report. @param clouds  of a session; null: of a recording @return the exit status
+int deliver(const Options& options, const Result<model::Model>& built, const std::string& subject,
+            model::Progress& progress, model::LiveClouds* clouds) {
+  if (!built) return progress.fail(built.error());
+  if (auto written = write_models(options, built->mesh, subject, progress, clouds); !written) {
+    const std::filesystem::path folder = clouds ? clouds->keep_folder() : std::filesystem::path();
+    if (!folder.empty())
+      written.error().message += "; the clouds are kept: then build the model again with --from " + folder.string();
+    return progress.fail(written.error());
+  }
+  progress.finish(built->mesh);
+  if (print_report(options, *built, progress)) return 0;
+  std::fputs("slsd-model: cannot write the report to standard output: check whether its disk is full\n", stderr);
+  return 1;
 }
 
 /// @param taker  a ModelBuilder or a LiveSession
@@ -147,7 +176,8 @@ int run_recorded(const Options& options, model::Progress& progress) {
   }
   const auto tell = [&progress](const std::string& sentence) { progress.say(sentence); };
   const auto advance = [&progress](std::size_t done, std::size_t clouds) { progress.build(done, clouds); };
-  return deliver(options, builder.finish(read, tell, advance), options.recording.filename().string(), progress);
+  return deliver(options, builder.finish(read, tell, advance), options.recording.filename().string(), progress,
+                 nullptr);
 }
 
 int run_live(const Options& options, model::Progress& progress) {
@@ -167,7 +197,7 @@ int run_live(const Options& options, model::Progress& progress) {
     progress.say(to_string(ended.error()) + "; the model is of the clouds before that");
   }
   const auto advance = [&progress](std::size_t done, std::size_t all) { progress.build(done, all); };
-  const int status = deliver(options, session.finish(advance), "clouds of the scanner", progress);
+  const int status = deliver(options, session.finish(advance), "clouds of the scanner", progress, &session.clouds());
   return status == 0 && !ended ? 1 : status;
 }
 

@@ -128,6 +128,22 @@ class Mesh(unittest.TestCase):
         self.assertEqual(len(done.stdout), 84 + 50 * int.from_bytes(done.stdout[80:84], "little"))
         self.assertTrue(picture.read_bytes().startswith(b"\x89PNG"))
 
+    def test_a_full_disk_leaves_the_file_before(self):
+        """A limit on a file's size stands for the full disk: what probes the place before the scan fits, the cloud does not."""
+        limited = "ulimit -f 128; trap '' XFSZ; exec \"$@\""
+        for name in ("a.ply", "a.pcd", "a.stl", "a.obj", "a.glb", "a.tiff"):
+            with self.subTest(name=name):
+                file = self.folder / name
+                file.write_text("before", encoding="utf-8")
+                done = subprocess.run(("bash", "-c", limited, "bash", BIN / "slsctl", "--socket", self.service.socket, "scan", "-o", file,
+                                       "--density", "pixels", "--timeout-ms", "600000"),
+                                      capture_output=True, text=True, timeout=600, check=False)
+                self.assertEqual(done.returncode, 1)
+                self.assertEqual(done.stderr, f"slsctl: {file}: cannot write: File too large; free some space or choose another place\n")
+                self.assertEqual(file.read_text(encoding="utf-8"), "before")
+                file.unlink()
+                self.assertEqual(list(self.folder.iterdir()), [])
+
     def test_what_has_no_mesh_is_refused(self):
         cases = {("a.stl", "--density", "symbols"): "a mesh needs --density pixels",
                  ("a.glb", "--normals"): "leave out --normals", ("a.pcd", "--mesh"): ".ply, .stl, .obj or .glb",

@@ -28,6 +28,12 @@ from service import Service, slsctl  # noqa: E402
 PROGRAM = pathlib.Path(os.environ["SLSD_BIN"]) / "slsd-model"
 WIDTH, HEIGHT, FOCUS = 220, 200, 1000.0
 MIDDLE = np.array([0, 0, 600.0])
+# Runs a program in a folder, on a disk of its own or under a limit, and copies what it left.
+ON_A_DISK = """[ -z "$SIZE" ] || mount -t tmpfs -o "size=$SIZE" none "$DISK" || exit
+cd "$DISK" && echo before > model.stl || exit
+([ -z "$LIMIT" ] || ulimit -f "$LIMIT"; trap "" XFSZ; exec "$@"); status=$?
+cp -r . "$AFTER"; exit $status"""
+OWN_MOUNTS = ("unshare", "--mount", "--map-root-user")
 PYTHON_ASKS = ("transport", "timeout_ms", "normals", "texture", "ambient", "picture", "why")
 STEP_DEGREES, SIGMA_MM, ALIKE_PX = 12, 0.05, 6
 
@@ -449,6 +455,66 @@ class Model(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertRegex(done.stderr, "00000005.ply.*; the model is of the clouds before that")
         self.assertEqual(len(json.loads(done.stdout)["fused"]), 5)
+
+    def on_a_disk(self, *arguments, size="", limit_kib=""):
+        """A turntable's session of six views, whose folder, also the temporary one, lies on a disk of this size.
+
+        limit_kib  instead: files may grow so large
+        """
+        scanner, _ = self.scanner(self.clouds)
+        disk, after = (tempfile.mkdtemp(dir=self.folder) for _ in range(2))
+        command = [*(OWN_MOUNTS if size else ()), "bash", "-c", ON_A_DISK, "bash", PROGRAM, "--socket", scanner.path,
+                   "--turntable", "--views", "30", "--json", *arguments]
+        done = subprocess.run(command, input="\n" * 6, capture_output=True, text=True, timeout=600, check=False,
+                              env={**os.environ, "DISK": disk, "AFTER": after, "TMPDIR": disk, "SIZE": size,
+                                   "LIMIT": str(limit_kib)})
+        return done, disk, pathlib.Path(after)
+
+    def kept_clouds(self, done, disk, after):
+        """The folder that the message names, where it is now."""
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual((after / "model.stl").read_text(encoding="utf-8"), "before\n")
+        told = re.findall(r"(?m)^slsd-model: model.stl: cannot write: .*free some space or choose another place; the clouds are kept: "
+                          r"then build the model again with --from (.*)$", done.stderr)
+        self.assertEqual(len(told), 1, done.stderr)
+        folder = after / pathlib.Path(told[0]).relative_to(disk)
+        self.assertTrue(set(after.iterdir()) <= {after / "model.stl", after / "model.3mf", folder}, list(after.iterdir()))
+        return folder
+
+    def test_a_full_disk_keeps_the_clouds_and_the_file_before(self):
+        """A limit on a file's size stands for the full disk: the clouds and the 3MF fit, the STL does not."""
+        done, *where = self.on_a_disk("-o", "model.stl", "-o", "model.3mf", "--voxel", "1.5", limit_kib=512)
+        folder = self.kept_clouds(done, *where)
+        self.assertTrue(zipfile.is_zipfile(where[1] / "model.3mf"))  # one file keeps no other from being written
+        again = run("--from", folder, "-o", self.folder / "model_again.stl", "--voxel", "1.5", "--json")
+        self.assertEqual((again.returncode, again.stderr), (0, ""))
+        self.assertEqual(len(json.loads(again.stdout)["fused"]), 6)
+        self.assertGreater((self.folder / "model_again.stl").stat().st_size, 512 << 10)
+
+    def test_a_disk_that_clouds_fill_has_the_model_in_their_place(self):
+        """The sixth cloud finds no room on a real full disk, nor would the model, beside the five."""
+        if subprocess.run([*OWN_MOUNTS, "true"], stderr=subprocess.DEVNULL, check=False).returncode:
+            self.skipTest("this machine gives no mount namespace")
+        done, _, after = self.on_a_disk("-o", "model.stl", "--voxel", "2", size="2100k")
+        self.assertEqual(done.returncode, 1)
+        self.assertRegex(done.stderr, "00000005.ply: cannot write: No space .*; the model is of the clouds before that\n$")
+        self.assertEqual(len(json.loads(done.stdout)["fused"]), 5)
+        self.assertEqual(list(after.iterdir()), [after / "model.stl"])
+        self.assertEqual((after / "model.stl").stat().st_size, 84 + 50 * json.loads(done.stdout)["triangles"])
+        # This one would not fit without the clouds, either.
+        folder = self.kept_clouds(*self.on_a_disk("-o", "model.stl", "--voxel", "0.5", size="2100k"))
+        self.assertEqual(len(list((folder / "clouds").iterdir())), 5)
+
+    def test_a_report_that_finds_no_room_says_so(self):
+        few = record(self.folder / "few", self.clouds[:3])
+        for form in ((), ("--json",), ("--progress",)):
+            with open("/dev/full", "w", encoding="utf-8") as full:
+                done = subprocess.run((PROGRAM, "--from", few, "-o", self.folder / "few.stl", "--voxel", "3", *form), stdout=full,
+                                      stderr=subprocess.PIPE, text=True, timeout=600, check=False)
+            self.assertEqual(done.returncode, 1, form)
+            self.assertEqual(done.stderr.count("cannot write the report to standard output: check whether its disk is full"), 1)
+            self.assertGreater((self.folder / "few.stl").stat().st_size, 1000)
+            (self.folder / "few.stl").unlink()
 
     def test_a_box_leaves_out_what_lies_beside(self):
         rows = [cloud(bumpy_ball, degrees, degrees) for degrees in (0, 12, 24)]
