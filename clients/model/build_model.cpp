@@ -47,6 +47,13 @@ double invented_share(const Mesh& mesh) {
   return all > 0 ? invented / all : 0;
 }
 
+/// The refused frame whose reason most of them share.
+const RefusedFrame& usual_refusal(const std::vector<RefusedFrame>& refused) {
+  return *std::ranges::max_element(refused, {}, [&](const RefusedFrame& frame) {
+    return std::ranges::count(refused, frame.reason, &RefusedFrame::reason);
+  });
+}
+
 double way_degrees(std::span<const ModelFrame> frames) {
   double sum = 0;
   for (std::size_t i = 1; i < frames.size(); ++i)
@@ -122,6 +129,7 @@ bool ModelBuilder::closed(const SeenSides& sides) const {
 Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell, const Advance& advance) {
   Model model{{}, std::move(report_)};
   ModelReport& report = model.report;
+  const std::size_t lost = report.refused.size();
   std::vector<ModelFrame>& frames = tracker_.frames();
   if (frames.empty())
     return fail(ErrorCode::kMalformed, report.refused.empty() ? "no cloud came"
@@ -154,10 +162,16 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell, const Adv
   }
   if (advance) advance(frames.size(), frames.size());
   model.mesh = tidy(options_.close ? volume.closed_mesh() : volume.mesh(), kSmallestPiece);
-  if (model.mesh.triangles.empty())
-    return fail(
-        ErrorCode::kMalformed,
-        "no place was measured by two clouds: record more, and turn the object by at most 15 degrees between two");
+  if (model.mesh.triangles.empty()) {
+    std::string what = "no place was measured by two clouds: ";
+    if (2 * lost >= report.frames) {
+      const RefusedFrame& usual = usual_refusal(report.refused);
+      what += fmt::format("{} of {} were left out; {}: {}", lost, report.frames, usual.name, usual.reason);
+    } else {
+      what += "record more, and turn the object by at most 15 degrees between two";
+    }
+    return fail(ErrorCode::kMalformed, std::move(what));
+  }
   report.volume_bytes = volume.bytes();
   report.invented_share = invented_share(model.mesh);
   std::vector<float> sigmas = model.mesh.sigma_mm;

@@ -33,6 +33,7 @@ ON_A_DISK = """[ -z "$SIZE" ] || mount -t tmpfs -o "size=$SIZE" none "$DISK" || 
 cd "$DISK" && echo before > model.stl || exit
 ([ -z "$LIMIT" ] || ulimit -f "$LIMIT"; trap "" XFSZ; exec "$@"); status=$?
 cp -r . "$AFTER"; exit $status"""
+TWO_BODIES = "two bodies in view move differently: show one alone, or leave out what stands still with --background or --box"
 OWN_MOUNTS = ("unshare", "--mount", "--map-root-user")
 PYTHON_ASKS = ("transport", "timeout_ms", "normals", "texture", "ambient", "picture", "why")
 STEP_DEGREES, SIGMA_MM, ALIKE_PX = 12, 0.05, 6
@@ -48,6 +49,14 @@ def bumpy_ball(at):
 
 def smooth_ball(at):
     return np.linalg.norm(at, axis=1) - 50
+
+
+def pair(left_degrees, right_degrees):
+    """Signed distance to two bumpy balls of 25 mm side by side, each turned by itself."""
+    def distance(at):
+        balls = ((at + [29.0, 0, 0]) @ turn(left_degrees), (at - [29.0, 0, 0]) @ turn(90 + right_degrees))
+        return 0.5 * np.minimum(*(bumpy_ball(2 * ball) for ball in balls))
+    return distance
 
 
 def turn(degrees):
@@ -273,6 +282,30 @@ class Model(unittest.TestCase):
         self.assertFalse(report["closed"])
         self.assertEqual(done.stderr.count("left out"), 3)
         self.assertLess(np.quantile(abs(off_truth_mm(mesh_ply((self.folder / "c.ply").read_bytes())[0])), 0.95), 0.13)
+
+    def left_out(self, done):
+        """The reason by number of the cloud."""
+        return {int(number): why for number, why in re.findall(r"(?m)^slsd-model: clouds/(\d+).ply: left out: (.*)$", done.stderr)}
+
+    def test_two_bodies_that_move_differently_give_no_mesh(self):
+        turns = {"against": lambda i: (8 * i, -8 * i), "one stands": lambda i: (0, 10 * i), "slowly": lambda i: (4 * i, -4 * i)}
+        for name, degrees in turns.items():
+            with self.subTest(name=name):
+                two = record(self.folder / name, [cloud(pair(*degrees(i)), 0, i) for i in range(5)])
+                done = run("--from", two, "-o", self.folder / "two.ply")
+                self.assertEqual((done.returncode, done.stdout), (1, ""))
+                why = self.left_out(done)
+                for i in range(3 if name == "slowly" else 1, 5):
+                    self.assertEqual(why[i], TWO_BODIES)
+                self.assertRegex(done.stderr, f"no place was measured by two clouds: 4 of 5 were left out; clouds/0000000\\d.ply: {TWO_BODIES}\n$")
+                self.assertFalse((self.folder / "two.ply").exists())
+
+    def test_what_was_measured_before_two_bodies_part_is_the_model(self):
+        clouds = [cloud(pair(0, 10 * max(0, i - 2)), 10 * i, i) for i in range(5)]
+        done = run("--from", record(self.folder / "part", clouds), "-o", self.folder / "before.ply", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.left_out(done), {3: TWO_BODIES, 4: TWO_BODIES})
+        self.assertEqual([frame["frame"][-6:-4] for frame in json.loads(done.stdout)["fused"]], ["00", "01", "02"])
 
     def test_what_gives_no_model_says_why(self):
         ball = record(self.folder / "ball", [cloud(smooth_ball, degrees, degrees) for degrees in (0, 10)])

@@ -97,10 +97,16 @@ Tracked Tracker::begin(const Shot& shot) const {
   return {alignment, {}, false};
 }
 
-bool Tracker::is_of_two(const Shot& shot, const RigidTransform& object_from_rig) const {
+bool Tracker::is_of_two(const Shot& shot, const RigidTransform& object_from_rig, bool refused) const {
+  const auto shows_since = [&](const ModelFrame& before) {
+    const std::array starts{before.object_from_rig, expected(), object_from_rig};
+    return shows_two_bodies({&shot, object_from_rig}, {&before.shot, before.object_from_rig}, starts);
+  };
   const ModelFrame& before = doubtful_ ? *doubtful_ : frames_.back();
-  const std::array starts{before.object_from_rig, expected(), object_from_rig};
-  return shows_two_bodies({&shot, object_from_rig}, {&before.shot, before.object_from_rig}, starts);
+  if (shows_since(before)) return true;
+  // Bodies that part slowly moved more since the last keyframe.
+  const ModelFrame& keyframe = frames_[keyframes_.back()];
+  return refused && &keyframe != &before && shows_since(keyframe);
 }
 
 Tracked Tracker::follow(const Shot& shot) {
@@ -138,7 +144,7 @@ Tracked Tracker::add(std::size_t number, Shot shot) {
   }
   candidate_.reset();
   Tracked tracked = frames_.empty() ? begin(shot) : follow(shot);
-  if (candidate_ && is_of_two(shot, *candidate_)) {
+  if (candidate_ && is_of_two(shot, *candidate_, !tracked.alignment)) {
     for (SurfaceView& view : shot.views) view.image.drop_pixels();
     doubtful_ = {number, std::move(shot), *candidate_};
     lost_ = !frames_.empty();

@@ -47,7 +47,7 @@ class Tracker {
  private:
   [[nodiscard]] Tracked begin(const Shot& shot) const;
   [[nodiscard]] Tracked follow(const Shot& shot);
-  [[nodiscard]] bool is_of_two(const Shot& shot, const RigidTransform& object_from_rig) const;
+  [[nodiscard]] bool is_of_two(const Shot& shot, const RigidTransform& object_from_rig, bool refused) const;
   [[nodiscard]] std::optional<Alignment> search(const Shot& shot) const;
   [[nodiscard]] std::vector<PlacedShot> latest_keyframes() const;
   void add_keyframe();

@@ -137,6 +137,15 @@ bool shows_two_bodies(const PlacedShot& placed, const PlacedShot& before, std::s
   // A place between those of two bodies explains little of either.
   for (int i = 0; i < kPlaces; ++i) {
     const auto other = best_place(rest, before, starts, all / kPieceShare);
+    if (!other && i == 0 && 2 * first < all) {
+      // Such a place may have taken so much of each body that neither is found in the rest.
+      rest = *placed.shot;
+      const auto body = best_place(rest, before, starts, all / kPieceShare);
+      if (!body) return false;
+      place = body->object_from_rig;
+      first = explain(rest, before_from_object.after(place), *before.shot);
+      continue;
+    }
     if (!other) return false;
     const double off_px = apart_px(rest, place, other->object_from_rig);
     const std::size_t second = explain(rest, before_from_object.after(other->object_from_rig), *before.shot);

@@ -43,12 +43,23 @@ TEST(TwoBodies, AreRefusedIfOneStandsStill) {
 TEST(TwoBodies, AreRefusedIfTheyTurnAgainstEachOther) {
   Tracker tracker;
   EXPECT_EQ(tracker.add(0, shot_of_pair(0, 0, 0, 1)).refusal, "");
-  for (unsigned i = 1; i < 4; ++i) {
+  for (unsigned i = 1; i < 6; ++i) {
     const float degrees = 8 * static_cast<float>(i);
+    EXPECT_THAT(tracker.add(i, shot_of_pair(degrees, -degrees, 0, i)).refusal,
+                HasSubstr("two bodies in view move differently"));
+  }
+  EXPECT_EQ(tracker.frames().size(), 1U);
+}
+
+TEST(TwoBodies, AreToldOnceSlowOnesAreApart) {
+  Tracker tracker;
+  EXPECT_EQ(tracker.add(0, shot_of_pair(0, 0, 0, 1)).refusal, "");
+  for (unsigned i = 1; i < 7; ++i) {
+    const float degrees = 4 * static_cast<float>(i);
     const std::string refusal = tracker.add(i, shot_of_pair(degrees, -degrees, 0, i)).refusal;
     EXPECT_NE(refusal, "");
-    if (i == 1) {
-      EXPECT_THAT(refusal, HasSubstr("two bodies in view move differently"));
+    if (i > 2) {
+      EXPECT_THAT(refusal, HasSubstr("two bodies in view move differently")) << i;
     }
   }
 }
