@@ -119,6 +119,31 @@ class RowPlaces {
   std::array<std::vector<float>, 3> places_;
 };
 
+// Joins rows to pieces that stay in the processor's cache until the sink has taken them.
+class PieceBuffer {
+ public:
+  explicit PieceBuffer(ByteSink& sink) : sink_(sink) {}
+  // @return the place for the next row, of at most so many bytes
+  [[nodiscard]] char* room(std::size_t row_bytes) {
+    if (filled_ + row_bytes > bytes_.size()) {
+      flush();
+      if (row_bytes > bytes_.size()) bytes_.resize(std::max(kPieceBytes, row_bytes));
+    }
+    return bytes_.data() + filled_;
+  }
+  void fill_to(const char* end) { filled_ = static_cast<std::size_t>(end - bytes_.data()); }
+  void flush() {
+    if (filled_ > 0) sink_.take({bytes_.data(), filled_});
+    filled_ = 0;
+  }
+
+ private:
+  static constexpr std::size_t kPieceBytes = 256 << 10U;
+  ByteSink& sink_;
+  std::vector<char> bytes_;
+  std::size_t filled_ = 0;
+};
+
 template <class Value>
 void put(char*& to, Value value) {
   std::memcpy(to, &value, sizeof value);
@@ -187,11 +212,11 @@ std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured) 
   std::array<std::size_t, kSteps> ratios{};
   view.colours.assign(coloured ? view.map.pixels.size() : 0, Rgb{});
   const auto sample = [](const ColourFrame* colours, int x, int y) {
-    ColourSample sample;
-    if (colours == nullptr) return sample;
-    std::ranges::copy(colours->at(x, y), sample.levels.begin());
-    sample.highest = std::ranges::max(sample.levels);
-    return sample;
+    ColourSample taken;
+    if (colours == nullptr) return taken;
+    std::ranges::copy(colours->at(x, y), taken.levels.begin());
+    taken.highest = std::ranges::max(taken.levels);
+    return taken;
   };
   for (int y = 0; y < view.map.height; ++y) {
     for (int x = 0; x < view.map.width; ++x) {
@@ -228,39 +253,41 @@ std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured) 
   return saturated;
 }
 
-std::string write_dense_ply(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig) {
-  std::string bytes = dense_ply_header(facts_of(cloud, normals, base_from_rig), cloud.points());
+void write_dense_ply(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig, ByteSink& sink) {
+  const std::size_t points = cloud.points();
+  const std::string header = dense_ply_header(facts_of(cloud, normals, base_from_rig), points);
   const bool coloured = cloud.coloured();
   const std::size_t record = dense_ply_bytes(normals, coloured);
-  bytes.reserve(bytes.size() + cloud.points() * record);
-  std::string row;
+  sink.expect(header.size() + points * record);
+  sink.take(header);
+  PieceBuffer buffer(sink);
   for (const DenseView& view : cloud.views) {
     const RigidTransform place = file_from_camera(view, base_from_rig);
-    const ViewPoints points(view, place);
+    const ViewPoints normal_points(view, place);
     RowPlaces places(view, place);
-    row.resize(static_cast<std::size_t>(view.map.width) * record);
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
-      char* to = row.data();
+      char* to = buffer.room(static_cast<std::size_t>(view.map.width) * record);
       for (int x = 0; x < view.map.width; ++x)
         if (has_point(view, x, y)) {
-          put_point<std::uint8_t>(to, view, places, points, x, y, normals);
+          put_point<std::uint8_t>(to, view, places, normal_points, x, y, normals);
           if (coloured) put(to, colour_at(view, x, y));
         }
-      bytes.append(row.data(), to);
+      buffer.fill_to(to);
     }
   }
-  return bytes;
+  buffer.flush();
 }
 
-std::string write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig) {
+void write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig, ByteSink& sink) {
   int width = 0, height = 0;
   for (const DenseView& view : cloud.views) width = std::max(width, view.map.width), height += view.map.height;
-  std::string bytes = dense_pcd_header(facts_of(cloud, normals, base_from_rig), width, height);
-  const std::size_t begin = bytes.size();
+  const std::string header = dense_pcd_header(facts_of(cloud, normals, base_from_rig), width, height);
   const bool coloured = cloud.coloured();
-  bytes.resize(begin + static_cast<std::size_t>(width) * height * dense_pcd_bytes(normals, coloured));
-  char* to = bytes.data() + begin;
+  const std::size_t row_bytes = width * dense_pcd_bytes(normals, coloured);
+  sink.expect(header.size() + height * row_bytes);
+  sink.take(header);
+  PieceBuffer buffer(sink);
   const Eigen::Vector3f none = Eigen::Vector3f::Constant(kNone);
   for (const DenseView& view : cloud.views) {
     const RigidTransform place = file_from_camera(view, base_from_rig);
@@ -268,6 +295,7 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTr
     RowPlaces places(view, place);
     for (int y = 0; y < view.map.height; ++y) {
       places.place(y);
+      char* to = buffer.room(row_bytes);
       for (int x = 0; x < width; ++x) {
         if (has_point(view, x, y)) {
           put_point<float>(to, view, places, points, x, y, normals);
@@ -281,9 +309,10 @@ std::string write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTr
         if (normals) put(to, none);
         if (coloured) put(to, packed(Rgb{}));
       }
+      buffer.fill_to(to);
     }
   }
-  return bytes;
+  buffer.flush();
 }
 
 namespace {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/cloud/byte_sink.hpp"
 #include "core/cloud/shade_points.hpp"
 #include "core/dense/dense_map.hpp"
 #include "core/dense/ray_grid.hpp"
@@ -49,12 +50,10 @@ std::size_t shade_view(DenseView& view, const SceneLight& light, bool coloured =
 // base_from_rig, else in the rig's frame.
 
 /// The measured points, row by row and camera by camera: 18 bytes each.
-[[nodiscard]] std::string write_dense_ply(const DenseCloud& cloud, bool normals,
-                                          const RigidTransform* base_from_rig = nullptr);
+void write_dense_ply(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig, ByteSink& sink);
 /// Organised: a point for each pixel, NaN if not measured, with the cameras' images stacked vertically. 21 bytes each,
 /// as intensity is a float: PCL's PointXYZI accepts nothing else.
-[[nodiscard]] std::string write_dense_pcd(const DenseCloud& cloud, bool normals,
-                                          const RigidTransform* base_from_rig = nullptr);
+void write_dense_pcd(const DenseCloud& cloud, bool normals, const RigidTransform* base_from_rig, ByteSink& sink);
 /// Two pages of floats for each camera: Z in its frame, mm, and sigma_mm.
 [[nodiscard]] std::string write_dense_tiff(const DenseCloud& cloud);
 

@@ -3,23 +3,14 @@
 #include "daemon/server/lent_memory.hpp"
 
 #include <fcntl.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <string>
 #include <utility>
 
-#include "drivers/system/system_error.hpp"
-
 namespace slsd {
 namespace {
-
-FileDescriptor open_to_read(const FileDescriptor& memory) {
-  const std::string path = "/proc/self/fd/" + std::to_string(memory.number());
-  return FileDescriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-}
 
 // The kernel grants a write lease only to the sole opener of a file, and a mapping counts as an opening. If it grants
 // no lease at all (an error other than EAGAIN), the memory is not watched.
@@ -30,24 +21,6 @@ bool is_held_by_others(const FileDescriptor& kept) {
 }
 
 }  // namespace
-
-Result<SealedMemory> sealed_memory(std::string_view bytes) {
-  const FileDescriptor memory(::memfd_create("slsd-cloud", MFD_CLOEXEC | MFD_ALLOW_SEALING));
-  if (!memory) return fail_system(errno, "cannot create a memfd");
-  for (std::string_view rest = bytes; !rest.empty();) {
-    const ssize_t written = ::write(memory.number(), rest.data(), rest.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return fail_system(errno, "cannot fill a memfd");
-    rest.remove_prefix(static_cast<std::size_t>(written));
-  }
-  if (::fcntl(memory.number(), F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0) {
-    return fail_system(errno, "cannot seal a memfd");
-  }
-  // Opens the file twice more, because the first descriptor, open for writing, would prevent the lease.
-  SealedMemory sealed{open_to_read(memory), open_to_read(memory), bytes.size()};
-  if (!sealed.given || !sealed.kept) return fail_system(errno, "cannot open a memfd for reading");
-  return sealed;
-}
 
 LentMemory::~LentMemory() {
   for (const Lent& lent : lent_) budget_.give_back(lent.bytes);

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <string_view>
 #include <vector>
 
 #include "core/result.hpp"
@@ -11,17 +10,6 @@
 #include "drivers/system/file_descriptor.hpp"
 
 namespace slsd {
-
-/// A memfd whose bytes and size can no longer change.
-struct SealedMemory {
-  FileDescriptor given;  ///< the client's descriptor, for reading and mapping
-  FileDescriptor kept;   ///< our descriptor, which shows whether anybody still uses the memory
-  std::size_t bytes = 0;
-};
-
-/// @errors kNoSpace: out of memory or descriptors; kIo
-/// @thread reentrant
-[[nodiscard]] Result<SealedMemory> sealed_memory(std::string_view bytes);
 
 /// The memfds that clients use. They count as this process's memory until the last client has closed and unmapped them.
 /// Clients need not report that, and a malicious client never does.

@@ -83,7 +83,9 @@ void Server::update_demand() {
     if (!demand) demand.emplace();
     const double rate_hz = session->subscription()->rate_hz().value_or(std::numeric_limits<double>::infinity());
     demand->rate_hz = std::max(demand->rate_hz, rate_hz);
-    demand->formats = demand->formats | CloudFormats::only(session->subscription()->form());
+    const Subscription& wanted = *session->subscription();
+    demand->formats = demand->formats | (wanted.as_memfd() ? CloudFormats::only_memory(wanted.form())
+                                                           : CloudFormats::only(wanted.form()));
   }
   demand_changed_(demand);
 }

@@ -49,12 +49,11 @@ std::optional<Outgoing> Subscription::take(Clock::time_point now) {
     event.line = to_line(event_message("scan_failed", {{"error", rpc_error(publication->scan().error()).to_json()}}));
     return event;
   }
-  const SharedBytes cloud = publication->cloud(form_);
   nlohmann::json params = scan_json(*publication->scan(), form_.density);
   params["format"] = to_string(form_.format);
   add_frame(params, publication->base_from_rig(form_));
   if (as_memfd_) {
-    auto memory = sealed_memory(*cloud);
+    auto memory = publication->memory(form_);
     if (!memory) {
       ++lost_;  // the next event reports it
       event.line = to_line(event_message("scan_failed", {{"error", rpc_error(memory.error()).to_json()}}));
@@ -63,8 +62,8 @@ std::optional<Outgoing> Subscription::take(Clock::time_point now) {
     params["memfd_bytes"] = event.lent_bytes = memory->bytes;
     event.descriptor = std::move(memory->given), event.kept = std::move(memory->kept);
   } else {
-    event.bytes = cloud;
-    params["bytes"] = cloud->size();
+    event.bytes = publication->cloud(form_);
+    params["bytes"] = event.bytes->size();
   }
   params["latency_ms"] = latency_ms(publication->scan()->received);
   params["lost"] = std::exchange(lost_, 0);

@@ -26,6 +26,10 @@ class Publication {
 
   [[nodiscard]] const Result<ScanResult>& scan() const { return *scan_; }
   [[nodiscard]] SharedBytes cloud(CloudForm form) { return files_.file((*scan_)->cloud, (*scan_)->dense.get(), form); }
+  /// A memfd for one client. @errors kNoSpace; kIo
+  [[nodiscard]] Result<SealedMemory> memory(CloudForm form) {
+    return files_.memory((*scan_)->cloud, (*scan_)->dense.get(), form);
+  }
   /// The transform of a form's points; null: they are in the rig's frame.
   [[nodiscard]] const RigidTransform* base_from_rig(CloudForm form) const { return files_.base_from_rig(form); }
   /// Tells whether the cloud has that density. A scan taken before anybody asked for a point for each pixel has none.

@@ -144,8 +144,9 @@ Result<int> replay(const BundledRecording& recording, const path& folder) {
     if (folder.empty()) continue;
     Result<> written = write_below(folder, recording.name + "/replayed/" + numbered(number, ".ply"), ply);
     if (written && result->dense) {
-      written = write_below(folder, recording.name + "/replayed/" + numbered(number, ".dense.ply"),
-                            write_dense_ply(*result->dense, false));
+      StringSink dense;
+      write_dense_ply(*result->dense, /*normals=*/false, nullptr, dense);
+      written = write_below(folder, recording.name + "/replayed/" + numbered(number, ".dense.ply"), dense.bytes());
     }
     if (!written) return tl::unexpected(written.error());
   }

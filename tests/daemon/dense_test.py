@@ -180,6 +180,18 @@ class Dense(unittest.TestCase):
                 frames.append(event["params"]["frame"])
             self.assertEqual(frames, sorted(set(frames)))
 
+    def test_two_subscribers_get_memfds_of_their_own(self):
+        with self.service.client() as one, self.service.client() as other:
+            for client in (one, other):
+                client.call("subscribe", density="pixels", transport="memfd", format="pcd")
+            for client in (one, other):
+                for _ in range(2):
+                    event, memory = client.receive_with_descriptor()
+                    with memory:
+                        cloud = memory.read()
+                    self.assertEqual(event["params"]["memfd_bytes"], len(cloud))
+                    assert_same_surface(self, cloud, self.organised)
+
     def test_subscriber_that_keeps_memfds_gets_no_more(self):
         """Two of them, and then the newest once one is given back."""
         with self.service.client() as client, self.service.client() as other:

@@ -9,10 +9,13 @@
 #include <string>
 #include <string_view>
 
-#include "core/cloud/pcd.hpp"
-#include "core/cloud/ply.hpp"
+#include "core/cloud/byte_sink.hpp"
+#include "core/cloud/cloud.hpp"
 #include "core/decode/options.hpp"
 #include "core/dense/dense_cloud.hpp"
+#include "core/geometry/calibration.hpp"
+#include "core/result.hpp"
+#include "daemon/scan/cloud/sealed_memory.hpp"
 
 namespace slsd {
 
@@ -37,8 +40,8 @@ struct CloudForm {
   bool in_base = false;  ///< in the robot's base instead of the rig's frame
 
   CloudForm() = default;
-  CloudForm(CloudFormat of_format, Density of_density = Density::kSymbols,  // NOLINT: a format is a form
-            bool with_normals = false)
+  constexpr CloudForm(CloudFormat of_format, Density of_density = Density::kSymbols,  // NOLINT: a format is a form
+                      bool with_normals = false)
       : format(of_format), density(of_density), normals(with_normals) {}
   [[nodiscard]] bool dense() const { return density == Density::kPixels; }
 
@@ -57,28 +60,31 @@ struct CloudForm {
 /// The set of forms in which somebody wants a cloud.
 class CloudFormats {
  public:
-  [[nodiscard]] static CloudFormats only(CloudForm form) {
-    CloudFormats formats;
-    formats.bits_ = 1U << form.index();
-    return formats;
-  }
-  [[nodiscard]] bool has(CloudForm form) const { return (bits_ >> form.index() & 1U) != 0; }
+  [[nodiscard]] static CloudFormats only(CloudForm form) { return {1U << form.index(), 0}; }
+  /// One memfd in that form.
+  [[nodiscard]] static CloudFormats only_memory(CloudForm form) { return {0, 1U << form.index()}; }
+  CloudFormats() = default;
+
+  [[nodiscard]] bool has(CloudForm form) const { return (bytes_ >> form.index() & 1U) != 0; }
+  [[nodiscard]] bool has_memory(CloudForm form) const { return (memory_ >> form.index() & 1U) != 0; }
   /// Tells whether a form needs a point for each pixel.
-  [[nodiscard]] bool dense() const { return (bits_ & 0b111000'111000'111000'111000U) != 0; }
+  [[nodiscard]] bool dense() const { return ((bytes_ | memory_) & 0b111000'111000'111000'111000U) != 0; }
+  /// Two that want a memfd each share the bytes of the second.
   friend CloudFormats operator|(CloudFormats a, CloudFormats b) {
-    a.bits_ |= b.bits_;
-    return a;
+    return {a.bytes_ | b.bytes_ | (a.memory_ & b.memory_), a.memory_ | b.memory_};
   }
   friend bool operator==(CloudFormats, CloudFormats) = default;
 
  private:
-  std::uint32_t bits_ = 0;  // by CloudForm::index()
+  CloudFormats(std::uint32_t bytes, std::uint32_t memory) : bytes_(bytes), memory_(memory) {}
+  std::uint32_t bytes_ = 0;   // by CloudForm::index()
+  std::uint32_t memory_ = 0;  // by CloudForm::index()
 };
 
 /// Bytes that several clients may send, each at its own pace; hence shared.
 using SharedBytes = std::shared_ptr<const std::string>;
 
-/// A cloud's files, each written once.
+/// A cloud's files, each written once. Copies share them.
 /// @thread thread-bound; any thread may read the bytes
 class CloudFiles {
  public:
@@ -86,13 +92,7 @@ class CloudFiles {
   /// @param dense          null if no form needs it
   /// @param base_from_rig  of this cloud; if unknown, all forms stay in the rig's frame
   CloudFiles(const Cloud& cloud, const DenseCloud* dense, CloudFormats formats,
-             const std::optional<RigidTransform>& base_from_rig = {})
-      : base_from_rig_(base_from_rig) {
-    for (unsigned index = 0; index < CloudForm::kCount; ++index) {
-      const CloudForm form = CloudForm::of_index(index);
-      if (formats.has(form)) (void)file(cloud, dense, form);
-    }
-  }
+             const std::optional<RigidTransform>& base_from_rig = {});
 
   /// The transform of the points of a form; null: they are in the rig's frame.
   [[nodiscard]] const RigidTransform* base_from_rig(CloudForm form) const {
@@ -100,29 +100,19 @@ class CloudFiles {
   }
 
   /// Writes the file unless it exists already. @param cloud, dense  the same at each call
-  [[nodiscard]] const SharedBytes& file(const Cloud& cloud, const DenseCloud* dense, CloudForm form) {
-    SharedBytes& bytes = files_[form.index()];
-    if (!bytes) bytes = std::make_shared<const std::string>(write(cloud, dense, form));
-    return bytes;
-  }
+  [[nodiscard]] const SharedBytes& file(const Cloud& cloud, const DenseCloud* dense, CloudForm form);
+  /// A memfd of its own for each call: the one that was written with the cloud, then copies.
+  /// @param cloud, dense  the same at each call @errors kNoSpace; kIo
+  [[nodiscard]] Result<SealedMemory> memory(const Cloud& cloud, const DenseCloud* dense, CloudForm form);
 
-  [[nodiscard]] std::size_t bytes() const {
-    std::size_t sum = 0;
-    for (const SharedBytes& file : files_) sum += file ? file->size() : 0;
-    return sum;
-  }
+  [[nodiscard]] std::size_t bytes() const;
 
  private:
-  [[nodiscard]] std::string write(const Cloud& cloud, const DenseCloud* dense, CloudForm form) const {
-    const bool ply = form.format == CloudFormat::kPly;
-    const RigidTransform* const place = base_from_rig(form);
-    if (!form.dense() || dense == nullptr) return ply ? write_ply(cloud, place) : write_pcd(cloud, place);
-    if (form.format == CloudFormat::kTiff) return write_dense_tiff(*dense);
-    return ply ? write_dense_ply(*dense, form.normals, place) : write_dense_pcd(*dense, form.normals, place);
-  }
+  void write(const Cloud& cloud, const DenseCloud* dense, CloudForm form, ByteSink& sink) const;
 
   std::optional<RigidTransform> base_from_rig_;
   std::array<SharedBytes, CloudForm::kCount> files_;
+  std::array<std::shared_ptr<SealedMemory>, CloudForm::kCount> memories_;  // empty once they are given away
 };
 
 }  // namespace slsd

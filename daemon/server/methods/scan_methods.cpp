@@ -205,16 +205,15 @@ Outcome scan_reply(const ScanResult& scan, CloudForm form, bool as_memfd, FrameC
   if (why) reply.result["reasons"] = reasons_json(scan);
   reply.result["format"] = to_string(form.format);
   CloudFiles files = scan.files;
-  const SharedBytes cloud = files.file(scan.cloud, scan.dense.get(), form);
   add_frame(reply.result, files.base_from_rig(form));
   if (as_memfd) {
-    auto memory = sealed_memory(*cloud);
+    auto memory = files.memory(scan.cloud, scan.dense.get(), form);
     if (!memory) return tl::unexpected(rpc_error(memory.error()));
-    reply.result["memfd_bytes"] = cloud->size();
+    reply.result["memfd_bytes"] = memory->bytes;
     reply.memory = std::move(*memory);
   } else {
-    reply.result["bytes"] = cloud->size();
-    reply.bytes = cloud;
+    reply.bytes = files.file(scan.cloud, scan.dense.get(), form);
+    reply.result["bytes"] = reply.bytes->size();
   }
   if (!scan.picture_png.empty()) reply.first.push_back(picture_event(scan));
   for (const FrameImage& frame : scan.frames) reply.first.push_back(frame_event(scan.cloud.scan_id, frame, frames));
@@ -257,7 +256,7 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
   asked.request.colour = reader.boolean("colour", false);
   asked.request.texture = reader.boolean("texture", asked.request.colour);
   asked.request.ambient = reader.boolean("ambient", false);
-  asked.request.formats = CloudFormats::only(asked.form);
+  asked.request.formats = asked.as_memfd ? CloudFormats::only_memory(asked.form) : CloudFormats::only(asked.form);
   asked.request.gone = session.gone();
   asked.preset = reader.text("preset");
   const CloudOptions part = read_part(reader, state);

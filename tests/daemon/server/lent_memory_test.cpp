@@ -2,43 +2,19 @@
 // Copyright the slsd authors
 #include "daemon/server/lent_memory.hpp"
 
-#include <fcntl.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 
+#include "daemon/scan/cloud/sealed_memory.hpp"
+
 namespace slsd {
 namespace {
 
 constexpr std::size_t kLentBytes = 1 << 20;
-
-TEST(SealedMemory, HoldsTheBytesAndCannotChange) {
-  const auto memory = sealed_memory("a cloud");
-  ASSERT_TRUE(memory);
-  const int number = memory->given.number();
-  std::string bytes(7, '\0');
-  EXPECT_EQ(::read(number, bytes.data(), bytes.size()), 7);
-  EXPECT_EQ(bytes, "a cloud");
-  EXPECT_EQ(::fcntl(number, F_GET_SEALS), F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL);
-  EXPECT_LT(::write(number, "x", 1), 0);
-  EXPECT_NE(::ftruncate(number, 0), 0);
-}
-
-TEST(SealedMemory, SaysThatNoDescriptorIsLeft) {
-  rlimit before{};
-  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &before), 0);
-  const rlimit few{3, before.rlim_max};
-  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &few), 0);
-  const auto memory = sealed_memory("a cloud");
-  ::setrlimit(RLIMIT_NOFILE, &before);
-  ASSERT_FALSE(memory);
-  EXPECT_EQ(memory.error().code, ErrorCode::kNoSpace);
-}
 
 TEST(LentMemory, CountsUntilTheClientClosedAndUnmapped) {
   MemoryBudget budget(100 * kLentBytes);
