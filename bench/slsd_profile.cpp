@@ -30,6 +30,7 @@
 #include "core/dense/dense_mapper.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "drivers/files/read_image.hpp"
+#include "drivers/system/crew.hpp"
 #include "tests/corpus/read_with.hpp"
 
 namespace slsd {
@@ -63,9 +64,10 @@ class HardwareCounter {
   int file_;
 };
 
-double ms_of_thread() {
+/// Of this thread's processor or, if other threads help, of the clock on the wall.
+double ms_of(bool alone) {
   timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  clock_gettime(alone ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC, &now);
   return 1e3 * static_cast<double>(now.tv_sec) + 1e-6 * static_cast<double>(now.tv_nsec);
 }
 
@@ -80,6 +82,7 @@ constexpr std::size_t kStages = kStageCount + kDenseStageCount;
 /// The costs of a frame's stages, one after the other: those of the decoder, then those of the dense cloud.
 class StageMeter final : public StageObserver, public DenseObserver {
  public:
+  explicit StageMeter(bool alone) : alone_(alone) {}
   void start() { costs = {}, last_ = read(); }
   void stage_done(Stage stage) override { done(static_cast<std::size_t>(stage)); }
   void stage_done(DenseStage stage) override { done(kStageCount + static_cast<std::size_t>(stage)); }
@@ -94,14 +97,15 @@ class StageMeter final : public StageObserver, public DenseObserver {
     if (now.cache_misses) costs[stage].cache_misses = *now.cache_misses - *last_.cache_misses;
     last_ = read();
   }
-  [[nodiscard]] Cost read() const { return {ms_of_thread(), instructions_.now(), cache_misses_.now()}; }
+  [[nodiscard]] Cost read() const { return {ms_of(alone_), instructions_.now(), cache_misses_.now()}; }
+  bool alone_;
   HardwareCounter instructions_{PERF_COUNT_HW_INSTRUCTIONS}, cache_misses_{PERF_COUNT_HW_CACHE_MISSES};
   Cost last_;
 };
 
 struct Request {
   std::string frame, pattern, calibration;
-  int stride_px = DenseOptions{}.stride_px, repeat = 15;
+  int stride_px = DenseOptions{}.stride_px, repeat = 15, cores = 1;
   double part = 1;  ///< share of the frame to measure, in its middle
   bool without_anchor = false;
 };
@@ -172,18 +176,19 @@ Result<> profile(const Request& request) {
   const GreyView pixels = view(*frame);
   const double full = guess_full_level(pixels);
   OpencvAnchor anchor;
-  SerialExecutor executor;
-  StageMeter meter;
+  Crew executor(request.cores - 1);
+  StageMeter meter(request.cores == 1);
   std::vector<double> anchors, decodes, denses, wholes;
   std::array<std::vector<double>, kStages> stages;
   std::uint32_t points = 0;
   for (int i = 0; i <= request.repeat; ++i) {
-    const double before = ms_of_thread();
+    const double before = ms_of(true);
     if (const auto* grey = std::get_if<ImageView<std::uint8_t>>(&pixels); grey != nullptr && !request.without_anchor)
       (void)anchor.run(*grey);
-    const double after = ms_of_thread();
+    const double after = ms_of(true);
     meter.start();
-    if (const auto decoded = decoder->decode(pixels, full, &meter); !decoded) return tl::unexpected(decoded.error());
+    if (const auto decoded = decoder->decode(pixels, full, &meter, &executor); !decoded)
+      return tl::unexpected(decoded.error());
     points = mapper.measure(pixels, full, decoder->symbols(), executor, &meter).count(DensePixel::kMeasured);
     if (i == 0) continue;  // fills buffers
     anchors.push_back(after - before);
@@ -209,8 +214,9 @@ Result<> profile(const Request& request) {
   print_row("dense", std::ranges::min(denses), median(denses), anchor_ms, {});
   print_row("whole", std::ranges::min(wholes), median(wholes), anchor_ms, sum);
   print_row("anchor", anchor_ms, median(anchors), anchor_ms, {});
-  std::printf("%u points, stride %d px, one core; the least and the median of %d frames\n", points,
-              DenseMapper::stride_px(calibration->cameras[0].lens, options.dense), request.repeat);
+  const std::string cores = request.cores == 1 ? "one core" : fmt::format("{} cores", request.cores);
+  std::printf("%u points, stride %d px, %s; the least and the median of %d frames\n", points,
+              DenseMapper::stride_px(calibration->cameras[0].lens, options.dense), cores.c_str(), request.repeat);
   if (request.part < 1) {
     DenseMapper of_whole(*pattern, *calibration, 0, options);
     const DenseMap part = mapper.measure(pixels, full, decoder->symbols(), executor);
@@ -229,13 +235,16 @@ int main(int argc, char** argv) {
   using namespace slsd;
   cv::setNumThreads(1);  // the times are those of one core
   Request request;
-  CLI::App app("Prints what each stage of a dense cloud costs on one core, for a recorded frame.", "slsd-profile");
+  CLI::App app("Prints what each stage of a dense cloud costs, for a recorded frame.", "slsd-profile");
   app.add_option("frame", request.frame, "Image file of one camera")->required();
   app.add_option("--pattern", request.pattern, "Pattern file (default: pattern.toml beside the frame)");
   app.add_option("--calibration", request.calibration, "Calibration (default: calibration.yml beside the frame)");
   app.add_option("--stride", request.stride_px, "dense_stride_px")->check(CLI::Range(1, 16))->capture_default_str();
   app.add_option("--repeat", request.repeat, "Number of frames")->check(CLI::Range(1, 100000))->capture_default_str();
   app.add_option("--part", request.part, "Share of the frame to measure, in its middle")->check(CLI::Range(0.001, 1.0));
+  app.add_option("--cores", request.cores, "Threads that share each stage, as in the service; the anchor has one")
+      ->check(CLI::Range(1, 16))
+      ->capture_default_str();
   app.add_flag("--no-anchor", request.without_anchor, "Do not measure the anchor; for samplers");
   CLI11_PARSE(app, argc, argv);
   const auto beside = std::filesystem::path(request.frame).parent_path();

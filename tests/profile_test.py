@@ -28,6 +28,15 @@ class Profile(unittest.TestCase):
         self.assertGreater(int(re.search(r"^(\d+) points", out, re.M)[1]), 100000)
         self.assertLessEqual(sum(float(rows[stage][0]) for stage in stages), float(rows["whole"][0]) + 0.1)
 
+    def test_two_cores_give_the_same_points(self):
+        points = []
+        for cores in ("1", "2"):
+            out = subprocess.run([PROGRAM, f"{SOURCES}/tests/corpus/8px-6-dense-step-bright/frame.png", "--repeat", "1",
+                                  "--no-anchor", "--cores", cores], capture_output=True, text=True, check=True).stdout
+            points.append(re.search(r"^(\d+) points", out, re.M)[1])
+            self.assertIn("one core;" if cores == "1" else "2 cores;", out)
+        self.assertEqual(points[0], points[1])
+
     def test_a_missing_calibration_is_named(self):
         run = subprocess.run([PROGRAM, f"{SOURCES}/tests/corpus/8px-6-dense-step-bright/frame.png", "--calibration",
                               "none.yml"], capture_output=True, text=True, check=False)
