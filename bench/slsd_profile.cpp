@@ -64,7 +64,7 @@ class HardwareCounter {
   int file_;
 };
 
-/// Of this thread's processor or, if other threads help, of the clock on the wall.
+/// The time of this thread's processor or, if other threads help, of the clock on the wall.
 double ms_of(bool alone) {
   timespec now{};
   clock_gettime(alone ? CLOCK_THREAD_CPUTIME_ID : CLOCK_MONOTONIC, &now);
@@ -189,7 +189,7 @@ Result<> profile(const Request& request) {
     meter.start();
     if (const auto decoded = decoder->decode(pixels, full, &meter, &executor); !decoded)
       return tl::unexpected(decoded.error());
-    points = mapper.measure(pixels, full, decoder->symbols(), executor, &meter).count(DensePixel::kMeasured);
+    points = mapper.measure(pixels, full, decoder->symbols(executor), executor, &meter).count(DensePixel::kMeasured);
     if (i == 0) continue;  // fills buffers
     anchors.push_back(after - before);
     double decode = 0, dense = 0;

@@ -87,8 +87,8 @@ Sums sum_up(const ImageView<T>& frame, double full, const PatternField& field, c
 
 }  // namespace
 
-std::optional<float> BlurMeter::add(const GreyView& frame, double full, const PatternField& field,
-                                    const AlignOptions& options, const CellTask& task) {
+std::optional<PatchBlur> blur_of_patch(const GreyView& frame, double full, const PatternField& field,
+                                       const AlignOptions& options, const CellTask& task) {
   if (task.patch.failed || !(task.patch.state.gain > 0)) return std::nullopt;
   const Sums sums = std::visit([&](const auto& pixels) { return sum_up(pixels, full, field, options, task); }, frame);
   const Eigen::LDLT<Eigen::Matrix<float, kFitted, kFitted>> others(sums.normal);
@@ -98,12 +98,18 @@ std::optional<float> BlurMeter::add(const GreyView& frame, double full, const Pa
   const Changes asked = sums.changes_right - explained.transpose() * sums.right;
   const float blur = known(kOfBlur, kOfBlur), both = known(kOfBlur, kOfTone);
   if (!(blur > kKnownMin * sums.changes(kOfBlur, kOfBlur)) || !asked.allFinite()) return std::nullopt;
-  patches_.emplace_back(asked[kOfBlur] / blur, blur);
+  const float change = asked[kOfBlur] / blur;
+  PatchBlur patch{change, blur, field.blur_sigma_px() * field.blur_sigma_px() + change, 0, 0};
   // A wrong blur must not pass for a tone curve: it is eliminated, too.
   const float tone = known(kOfTone, kOfTone) - both * both / blur;
   if (tone > kKnownMin * sums.changes(kOfTone, kOfTone))
-    tones_.emplace_back((asked[kOfTone] - both / blur * asked[kOfBlur]) / tone, tone);
-  return field.blur_sigma_px() * field.blur_sigma_px() + asked[kOfBlur] / blur;
+    patch.tone_change = (asked[kOfTone] - both / blur * asked[kOfBlur]) / tone, patch.tone_weight = tone;
+  return patch;
+}
+
+void BlurMeter::add(const PatchBlur& patch) {
+  patches_.emplace_back(patch.change, patch.weight);
+  if (patch.tone_weight > 0) tones_.emplace_back(patch.tone_change, patch.tone_weight);
 }
 
 std::optional<float> BlurMeter::weighted_median(Weighted& values) {

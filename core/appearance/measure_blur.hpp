@@ -15,6 +15,20 @@
 
 namespace slsd {
 
+/// A patch's knowledge of the blur and of the tone curve.
+struct PatchBlur {
+  float change, weight;            ///< of the blur's variance, projector px^2, and its weight
+  float variance;                  ///< of the patch's blur, projector px^2
+  float tone_change, tone_weight;  ///< of the tone curve's power; the weight is 0 if the patch knows nothing of it
+};
+
+/// @param task  a patch that was aligned with the field
+/// @param full  the level of a saturated pixel, see Censored
+/// @return empty if the patch knows nothing of the blur
+/// @thread reentrant
+[[nodiscard]] std::optional<PatchBlur> blur_of_patch(const GreyView& frame, double full, const PatternField& field,
+                                                     const AlignOptions& options, const CellTask& task);
+
 /// Measures from aligned patches how much wider or narrower the frame's blur is than the field's. A change s of the
 /// blur's variance changes the pattern by s/2 times its Laplacian (the heat equation). This is one more unknown of the
 /// aligner's equations, the same for all patches, while each has its own place and light. Measures also the camera's
@@ -23,11 +37,7 @@ namespace slsd {
 class BlurMeter {
  public:
   void clear() { patches_.clear(), tones_.clear(); }
-  /// Adds a patch that was aligned with the field.
-  /// @param full  the level of a saturated pixel, see Censored
-  /// @return the variance of the patch's blur, projector px^2; empty if it knows nothing of it
-  std::optional<float> add(const GreyView& frame, double full, const PatternField& field, const AlignOptions& options,
-                           const CellTask& task);
+  void add(const PatchBlur& patch);
   /// Change of the variance, projector px^2: the median of the patches, weighted by what each knows. Empty without a
   /// patch that knows anything.
   [[nodiscard]] std::optional<float> change() { return weighted_median(patches_); }

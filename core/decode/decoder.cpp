@@ -41,6 +41,7 @@ struct Decoder::Parts {
   std::vector<double> depths_mm{};
   const std::vector<AlignedSymbol>* aligned = nullptr;  // symbols of this frame
   std::vector<TriangulatedPoint> solutions{};           // one for each symbol
+  bool are_solved = false;                              // the solutions are those of this frame's symbols
 
   const Lattice* lattice_read = nullptr;  // lattice of this frame
 
@@ -131,7 +132,7 @@ Result<const Decoding*> Decoder::decode(const GreyView& frame, std::optional<dou
   if (auto same = check_size(frame); !same) return tl::unexpected(same.error());
   const double level = full ? *full : parts_->full_level.of(frame);
   const Lattice& lattice = parts_->reader.read(frame, level, &parts_->view, shared, observer);
-  parts_->lattice_read = &lattice;
+  parts_->lattice_read = &lattice, parts_->are_solved = false;
   if (parts_->aligner) {
     parts_->place_symbols(shared);
     parts_->aligned = &parts_->aligner->align(frame, level, parts_->reader.noise(), lattice, parts_->rays,
@@ -162,23 +163,24 @@ void Decoder::Parts::solve(const std::vector<LatticeSymbol>& symbols, Executor& 
       PixelRays::kAtOnce);
 }
 
-DecodedSymbols Decoder::symbols() {
+DecodedSymbols Decoder::symbols(Executor& executor) {
   static const Lattice kNone;
   if (parts_->lattice_read == nullptr) return {&kNone, {}, {}, {}};
-  SerialExecutor alone;
-  parts_->place_symbols(alone);
+  parts_->place_symbols(executor);
   return {parts_->lattice_read, parts_->rays, parts_->depths_mm, parts_->reader.noise()};
 }
 
 void Decoder::Parts::place_symbols(Executor& executor) {
-  rays.clear(), depths_mm.clear();
-  solve(lattice_read->symbols, executor);
-  for (const LatticeSymbol& symbol : lattice_read->symbols)
-    rays.push_back(view.ray_near(symbol.sighting, symbol.centre_px));
-  for (const TriangulatedPoint& solved : solutions) {
-    const double depth = solved.point_in_camera.z();
-    depths_mm.push_back(depth > 0 ? depth : options.depth_max_mm);
-  }
+  const std::vector<LatticeSymbol>& symbols = lattice_read->symbols;
+  if (!are_solved) solve(symbols, executor);
+  rays.resize(symbols.size()), depths_mm.resize(symbols.size());
+  executor.run_ranges(symbols.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      rays[i] = view.ray_near(symbols[i].sighting, symbols[i].centre_px);
+      const double depth = solutions[i].point_in_camera.z();
+      depths_mm[i] = depth > 0 ? depth : options.depth_max_mm;
+    }
+  });
 }
 
 void Decoder::Parts::triangulate(const Lattice& lattice, double full, Executor& executor) {
@@ -189,6 +191,7 @@ void Decoder::Parts::triangulate(const Lattice& lattice, double full, Executor& 
     for (const AlignedSymbol& symbol : *aligned) solutions.push_back({symbol.point_in_camera, symbol.sigma_mm});
   } else {
     solve(lattice.symbols, executor);
+    are_solved = true;
   }
   decoding.points.clear();
   for (std::size_t i = 0; i < lattice.symbols.size(); ++i) {

@@ -68,7 +68,11 @@ class Decoder {
   [[nodiscard]] Result<const Decoding*> decode(const GreyView& frame, std::optional<double> full = std::nullopt,
                                                StageObserver* observer = nullptr, Executor* executor = nullptr);
   /// Returns the symbols of the last decoded frame.
-  [[nodiscard]] DecodedSymbols symbols();
+  [[nodiscard]] DecodedSymbols symbols(Executor& executor);
+  [[nodiscard]] DecodedSymbols symbols() {
+    SerialExecutor alone;
+    return symbols(alone);
+  }
 
  private:
   struct Parts;

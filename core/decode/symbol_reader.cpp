@@ -155,7 +155,7 @@ void SymbolReader::infer_cells(const GreyView& frame, EpipolarView* view, Execut
   }
   const CellGate gate = gate_of(view);
   inference_.propose(gate, executor, seen_);
-  recover(frame, gate, view);
+  recover(frame, gate, view, executor);
   inference_.decide(gate, executor, seen_);
 }
 
@@ -169,11 +169,11 @@ float SymbolReader::blur_px() const {
 }
 
 /// Requires the default method in all stages.
-void SymbolReader::recover(const GreyView& frame, const CellGate& gate, EpipolarView* view) {
+void SymbolReader::recover(const GreyView& frame, const CellGate& gate, EpipolarView* view, Executor& executor) {
   if (options_.any_paper()) return;
   const LetterScene scene{
       frame, 255.0 * finder_.frame_levels(), finder_.noise(), letters_->at(blur_px()), gate, look_->as_measured, seen_};
-  const std::vector<std::int32_t>& recovered = recovery_.recover(scene);
+  const std::vector<std::int32_t>& recovered = recovery_.recover(scene, executor);
   if (view == nullptr) return;
   for (const std::int32_t sighting : recovered) view->look_again_at(sighting, seen_);
 }

@@ -95,7 +95,7 @@ class SymbolReader {
   [[nodiscard]] CellGate gate_of(const EpipolarView* view) const;
   /// Blur of the pattern in this frame, standard deviation, projector px.
   [[nodiscard]] float blur_px() const;
-  void recover(const GreyView& frame, const CellGate& gate, EpipolarView* view);
+  void recover(const GreyView& frame, const CellGate& gate, EpipolarView* view, Executor& executor);
   void correspond(const EpipolarView* view, Executor& executor);
   void refuse_cut();
   void fit_lattice(const GreyView& frame, double full, const EpipolarView* view, Executor& executor);

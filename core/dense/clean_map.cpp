@@ -75,12 +75,21 @@ struct BitRows {
   std::size_t words;
   int height;
 
+  /// Calls with each row's number and the place of its bits.
+  template <class Take>
+  void for_each_row(Executor& executor, const Take& take) const {
+    constexpr std::size_t kRowsAtOnce = 64;
+    executor.run_ranges(
+        static_cast<std::size_t>(height),
+        [&](std::size_t first, std::size_t last, int) {
+          for (std::size_t y = first; y < last; ++y) take(static_cast<int>(y), words * y);
+        },
+        kRowsAtOnce);
+  }
   /// Ors, or ands, each bit with the bits up to `reach` before and after it in its row.
   template <class Combine>
-  void along(std::uint64_t* rows, int reach, std::uint64_t beyond, Combine combine) const {
-    for (int y = 0; y < height; ++y) {
-      for (int step = 0; step < reach; ++step) one_along(rows + words * static_cast<std::size_t>(y), beyond, combine);
-    }
+  void along(std::uint64_t* row, int reach, std::uint64_t beyond, Combine combine) const {
+    for (int step = 0; step < reach; ++step) one_along(row, beyond, combine);
   }
   template <class Combine>
   void one_along(std::uint64_t* row, std::uint64_t beyond, Combine combine) const {
@@ -91,15 +100,13 @@ struct BitRows {
       before = here;
     }
   }
+  /// The same for a row's columns, from all rows to this one.
   template <class Combine>
-  void across(const std::uint64_t* from, std::uint64_t* to, int reach, Combine combine) const {
-    for (int y = 0; y < height; ++y) {
-      std::uint64_t* row = to + words * static_cast<std::size_t>(y);
-      std::copy_n(from + words * static_cast<std::size_t>(y), words, row);
-      for (int k = std::max(0, y - reach); k <= std::min(height - 1, y + reach); ++k) {
-        const std::uint64_t* other = from + words * static_cast<std::size_t>(k);
-        for (std::size_t w = 0; w < words; ++w) row[w] = combine(row[w], other[w]);
-      }
+  void across(const std::uint64_t* from, int y, std::uint64_t* row, int reach, Combine combine) const {
+    std::copy_n(from + words * static_cast<std::size_t>(y), words, row);
+    for (int k = std::max(0, y - reach); k <= std::min(height - 1, y + reach); ++k) {
+      const std::uint64_t* other = from + words * static_cast<std::size_t>(k);
+      for (std::size_t w = 0; w < words; ++w) row[w] = combine(row[w], other[w]);
     }
   }
 };
@@ -124,43 +131,46 @@ void for_each_bit(const std::uint64_t* row, std::size_t words, const Take& take)
 
 }  // namespace
 
-void MapCleaner::drop_unlit_boundaries(DenseMap& map, int reach_px) {
+void MapCleaner::drop_unlit_boundaries(DenseMap& map, int reach_px, Executor& executor) {
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
-  bits_.assign(rows.words * static_cast<std::size_t>(map.height), 0);
-  rows_.resize(bits_.size());
-  for (int y = 0; y < map.height; ++y) {
-    const std::uint8_t* firm = map.firm.data() + static_cast<std::size_t>(y) * map.width;
-    Cloned<pack_row>::call(firm, map.width, std::uint8_t{1}, bits_.data() + rows.words * static_cast<std::size_t>(y));
-  }
+  const std::size_t all = rows.words * static_cast<std::size_t>(map.height);
+  bits_.resize(all), rows_.resize(all), measured_.resize(all);
   const auto either = [](std::uint64_t a, std::uint64_t b) { return a | b; };
   const auto both = [](std::uint64_t a, std::uint64_t b) { return a & b; };
-  rows.along(bits_.data(), reach_px, 0, either);
-  rows.across(bits_.data(), rows_.data(), reach_px, either);
-  rows.along(rows_.data(), reach_px, ~std::uint64_t{0}, both);
-  rows.across(rows_.data(), bits_.data(), reach_px, both);
-  measured_.resize(rows.words);
-  for (int y = 0; y < map.height; ++y) {
+  rows.for_each_row(executor, [&](int y, std::size_t row) {
+    std::uint64_t* const bits = bits_.data() + row;
+    Cloned<pack_row>::call(map.firm.data() + static_cast<std::size_t>(y) * map.width, map.width, std::uint8_t{1}, bits);
+    rows.along(bits, reach_px, 0, either);
+  });
+  rows.for_each_row(executor, [&](int y, std::size_t row) {
+    rows.across(bits_.data(), y, rows_.data() + row, reach_px, either);
+    rows.along(rows_.data() + row, reach_px, ~std::uint64_t{0}, both);
+  });
+  rows.for_each_row(executor, [&](int y, std::size_t row) {
     const std::size_t first = static_cast<std::size_t>(y) * map.width;
-    const std::uint64_t* enclosed = bits_.data() + rows.words * static_cast<std::size_t>(y);
+    std::uint64_t *const enclosed = bits_.data() + row, *const measured = measured_.data() + row;
+    rows.across(rows_.data(), y, enclosed, reach_px, both);
     Cloned<pack_row>::call(reinterpret_cast<const std::uint8_t*>(map.pixels.data()) + first, map.width, kMeasuredByte,
-                           measured_.data());
-    for (std::size_t w = 0; w < rows.words; ++w) measured_[w] &= ~enclosed[w];
-    for_each_bit(measured_.data(), rows.words, [&](std::size_t x) { map.drop(first + x, DensePixel::kUnlit); });
-  }
+                           measured);
+    for (std::size_t w = 0; w < rows.words; ++w) measured[w] &= ~enclosed[w];
+    for_each_bit(measured, rows.words, [&](std::size_t x) { map.drop(first + x, DensePixel::kUnlit); });
+  });
 }
 
 /// Finds the measured pixels, and those on one surface with the pixel to the right, and below.
-void MapCleaner::find_joined(const DenseMap& map) {
-  const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64, all = words * map.height;
-  measured_.assign(all, 0), right_.assign(all, 0), below_.assign(all, 0);
-  for (int y = 0; y < map.height; ++y) {
-    const std::size_t first = static_cast<std::size_t>(y) * map.width, row = words * static_cast<std::size_t>(y);
+void MapCleaner::find_joined(const DenseMap& map, Executor& executor) {
+  const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
+  const std::size_t all = rows.words * static_cast<std::size_t>(map.height);
+  measured_.resize(all), right_.resize(all), below_.resize(all);
+  rows.for_each_row(executor, [&](int y, std::size_t row) {
+    const std::size_t first = static_cast<std::size_t>(y) * map.width;
     const float* depth = map.depth_mm.data() + first;
     Cloned<pack_row>::call(reinterpret_cast<const std::uint8_t*>(map.pixels.data()) + first, map.width, kMeasuredByte,
                            measured_.data() + row);
+    std::fill_n(right_.data() + row, rows.words, 0), std::fill_n(below_.data() + row, rows.words, 0);
     Cloned<join_row>::call(depth, depth + 1, map.width - 1, right_.data() + row);
     if (y + 1 < map.height) Cloned<join_row>::call(depth, depth + map.width, map.width, below_.data() + row);
-  }
+  });
 }
 
 std::int32_t MapCleaner::root(std::int32_t run) {
@@ -204,8 +214,9 @@ void MapCleaner::find_runs(int width, int height, const First& first, const End&
   first_runs_.push_back(runs_.size());
 }
 
-void MapCleaner::drop_small_components(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds) {
-  find_joined(map);
+void MapCleaner::drop_small_components(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds,
+                                       Executor& executor) {
+  find_joined(map, executor);
   const std::size_t words = static_cast<std::size_t>(map.width + 63) / 64;
   const auto row = [&](const std::vector<std::uint64_t>& bits, int y) {
     return bits.data() + words * static_cast<std::size_t>(y);
@@ -271,9 +282,9 @@ void MapCleaner::find_small_holes(const DenseMap& map, std::size_t most) {
   }
 }
 
-void MapCleaner::prune(DenseMap& map, double reach_px, std::size_t hole_most) {
+void MapCleaner::prune(DenseMap& map, double reach_px, std::size_t hole_most, Executor& executor) {
   if (!(reach_px > 0)) return;
-  find_joined(map);
+  find_joined(map, executor);
   find_small_holes(map, hole_most);
   const BitRows rows{static_cast<std::size_t>(map.width + 63) / 64, map.height};
   const std::size_t words = rows.words;

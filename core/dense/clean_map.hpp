@@ -10,6 +10,7 @@
 
 #include "core/dense/dense_map.hpp"
 #include "core/dense/surface_grid.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 
@@ -19,12 +20,12 @@ class MapCleaner {
  public:
   /// Drops unlit pixels at boundaries: where the pattern is dark, a surface looks like a shadow. A pixel stays if firm
   /// ones enclose it, that is within their closing (dilation, then erosion by the same radius).
-  void drop_unlit_boundaries(DenseMap& map, int reach_px);
+  void drop_unlit_boundaries(DenseMap& map, int reach_px, Executor& executor);
   /// Drops areas without a jump inside that have fewer pixels than a patch: so few are no evidence. An area without a
   /// seed needs far more pixels.
-  void drop_small_components(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds);
+  void drop_small_components(DenseMap& map, std::size_t least, std::span<const SurfaceSeed> seeds, Executor& executor);
   /// Drops pixels closer than that to a hole or to a jump. Small holes inside one surface do not count.
-  void prune(DenseMap& map, double reach_px, std::size_t hole_most);
+  void prune(DenseMap& map, double reach_px, std::size_t hole_most, Executor& executor);
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use
 
  private:
@@ -40,7 +41,7 @@ class MapCleaner {
   [[nodiscard]] std::int32_t root(std::int32_t run);
   template <class First, class End, class Touch>
   void find_runs(int width, int height, const First& first, const End& end, const Touch& touch);
-  void find_joined(const DenseMap& map);
+  void find_joined(const DenseMap& map, Executor& executor);
   void find_small_holes(const DenseMap& map, std::size_t most);
 
   std::vector<Run> runs_;

@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/dense/dense_map.hpp"
 
+#include <cstring>
+
 namespace slsd {
 
 std::string_view to_string(DensePixel pixel) {
@@ -31,16 +33,26 @@ void DenseMap::take_part(const DenseMap& measured, int left, int top, const Pixe
 }
 
 void DenseMap::count_pixels() {
+  constexpr std::size_t kAtOnce = sizeof(std::uint64_t);
+  constexpr std::uint64_t kOnes = 0x0101010101010101U;
   counts.fill(0);
-  // Four tallies: most pixels have the status of the previous one, and would wait for its count.
-  std::array<std::array<std::uint32_t, kDensePixelCount>, 4> tallies{};
   const auto count = static_cast<std::size_t>(part.right - part.left);
   for (int y = part.top; y < part.bottom; ++y) {
     const DensePixel* const row = pixels.data() + static_cast<std::size_t>(y) * width + part.left;
-    for (std::size_t i = 0; i < count; ++i) ++tallies[i % 4][static_cast<std::size_t>(row[i])];
+    std::size_t i = 0;
+    // Most pixels have the status of those beside them.
+    for (; i + kAtOnce <= count; i += kAtOnce) {
+      std::uint64_t eight;
+      std::memcpy(&eight, row + i, kAtOnce);
+      const auto first = static_cast<std::size_t>(row[i]);
+      if (eight == kOnes * first) {
+        counts[first] += kAtOnce;
+      } else {
+        for (std::size_t k = i; k < i + kAtOnce; ++k) ++counts[static_cast<std::size_t>(row[k])];
+      }
+    }
+    for (; i < count; ++i) ++counts[static_cast<std::size_t>(row[i])];
   }
-  for (const auto& tally : tallies)
-    for (int i = 0; i < kDensePixelCount; ++i) counts[i] += tally[i];
   counts[static_cast<std::size_t>(DensePixel::kOutsideBox)] +=
       static_cast<std::uint32_t>(pixels.size() - count * static_cast<std::size_t>(part.bottom - part.top));
 }

@@ -128,21 +128,30 @@ void DenseMapper::warm_up() {
 }
 
 /// Computes the plane of each symbol: its depth, and the slopes that make the patch map match the grid of symbols.
-void DenseMapper::find_seeds(const DecodedSymbols& symbols) {
-  seeds_.clear();
-  for (std::size_t i = 0; i < symbols.lattice->symbols.size(); ++i) {
-    const LatticeSymbol& symbol = symbols.lattice->symbols[i];
-    const double depth_mm = symbols.depths_mm[i];
-    if (!(depth_mm >= fixed_->decode.depth_min_mm && depth_mm <= fixed_->decode.depth_max_mm)) continue;
-    const PatchGeometry& geometry = fixed_->geometry;
-    const PatchMap map = make_patch_map(symbols.rays[i], symbol.centre_px.cast<double>(),
-                                        geometry.camera.projector_from_camera, geometry.projector, depth_mm);
-    const Eigen::Vector2f at = map.base.topRightCorner<2, 1>();
-    const Eigen::Matrix2f flat = map.base.topLeftCorner<2, 2>() - at * map.base.bottomLeftCorner<1, 2>();
-    const Eigen::RowVector2f slopes = map.along.transpose() * (symbol.frame.inverse() - flat);
-    const auto per_px = static_cast<float>(map.inverse_depth_per_px);
-    seeds_.push_back({symbol.centre_px, {static_cast<float>(1 / depth_mm), slopes.x() * per_px, slopes.y() * per_px}});
-  }
+void DenseMapper::find_seeds(const DecodedSymbols& symbols, Executor& executor) {
+  const std::vector<LatticeSymbol>& all = symbols.lattice->symbols;
+  const auto is_in_range = [&](double depth_mm) {
+    return depth_mm >= fixed_->decode.depth_min_mm && depth_mm <= fixed_->decode.depth_max_mm;
+  };
+  seeds_.resize(all.size());
+  executor.run_ranges(all.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      const double depth_mm = symbols.depths_mm[i];
+      if (!is_in_range(depth_mm)) continue;
+      const PatchGeometry& geometry = fixed_->geometry;
+      const PatchMap map = make_patch_map(symbols.rays[i], all[i].centre_px.cast<double>(),
+                                          geometry.camera.projector_from_camera, geometry.projector, depth_mm);
+      const Eigen::Vector2f at = map.base.topRightCorner<2, 1>();
+      const Eigen::Matrix2f flat = map.base.topLeftCorner<2, 2>() - at * map.base.bottomLeftCorner<1, 2>();
+      const Eigen::RowVector2f slopes = map.along.transpose() * (all[i].frame.inverse() - flat);
+      const auto per_px = static_cast<float>(map.inverse_depth_per_px);
+      seeds_[i] = {all[i].centre_px, {static_cast<float>(1 / depth_mm), slopes.x() * per_px, slopes.y() * per_px}};
+    }
+  });
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (is_in_range(symbols.depths_mm[i])) seeds_[kept++] = seeds_[i];
+  seeds_.resize(kept);
 }
 
 /// The light of a frame's pixels, by the present tone curve.
@@ -155,12 +164,12 @@ DenseFrame DenseMapper::develop(const DenseFrame& frame) {
 /// Finds the frame's offset from its epipolar lines, its blur, and the camera's tone curve. Each looks like a part of
 /// the others, so it estimates them in turn.
 /// @return the light of the frame
-DenseFrame DenseMapper::find_pattern(const DenseFrame& frame) {
+DenseFrame DenseMapper::find_pattern(const DenseFrame& frame, Executor& executor) {
   DenseFrame light = frame;
   bool again = false;
   const auto look = [&](const BlurredPattern& tried) {
-    grid_.find_epipolar_offset(light, tried, seeds_, std::exchange(again, true));
-    return grid_.look_at_blur(light, tried, seeds_);
+    grid_.find_epipolar_offset(light, tried, seeds_, std::exchange(again, true), executor);
+    return grid_.look_at_blur(light, tried, seeds_, executor);
   };
   const float blur_px = find_blur_and_tone(
       *fixed_->fields, tone_, [&] { light = develop(frame); },
@@ -217,10 +226,10 @@ void DenseMapper::map_surface(const DenseFrame& seen, const PixelRectangle& with
   judge_.judge(seen, pattern_, grid_, map_, within, executor);
   done(DenseStage::kJudge);
   occlusion_.drop_occluded(map_, executor);
-  cleaner_.drop_unlit_boundaries(map_, fixed_->close_px);
+  cleaner_.drop_unlit_boundaries(map_, fixed_->close_px, executor);
   const std::size_t patch = static_cast<std::size_t>(fixed_->window_px) * fixed_->window_px;
-  cleaner_.drop_small_components(map_, patch, seeds_);
-  cleaner_.prune(map_, fixed_->decode.dense.prune_px, patch);
+  cleaner_.drop_small_components(map_, patch, seeds_, executor);
+  cleaner_.prune(map_, fixed_->decode.dense.prune_px, patch, executor);
   occlusion_.drop_beyond_the_light(map_);
   if (!tone_.is_straight()) {
     const auto levels = tone_.levels_of_lights();
@@ -264,7 +273,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
   }
   const DenseFrame taken{frame, full, symbols.noise};
   next = next && !part_;
-  find_seeds(symbols);
+  find_seeds(symbols, executor);
   tone_.set_power(next ? follower_.tone_power() : 1);
   DenseFrame seen = develop(taken);
   const auto from = next ? follower_.follow(seen, grid_, executor) : nullptr;
@@ -274,7 +283,7 @@ DenseMap& DenseMapper::measure(const GreyView& frame, double full, const Decoded
     grid_.set_epipolar_offset(from->epipolar);
   } else {
     if (!part_) grid_.clear();
-    seen = find_pattern(taken);
+    seen = find_pattern(taken, executor);
   }
   if (observer != nullptr) observer->stage_done(DenseStage::kFindBlur);
   if (part_) {

@@ -102,9 +102,9 @@ class DenseMapper {
  private:
   struct Fixed;
   explicit DenseMapper(std::shared_ptr<const Fixed> fixed);
-  void find_seeds(const DecodedSymbols& symbols);
+  void find_seeds(const DecodedSymbols& symbols, Executor& executor);
   [[nodiscard]] DenseFrame develop(const DenseFrame& frame);
-  [[nodiscard]] DenseFrame find_pattern(const DenseFrame& frame);
+  [[nodiscard]] DenseFrame find_pattern(const DenseFrame& frame, Executor& executor);
   DenseMap& measure(const GreyView& frame, double full, const DecodedSymbols& symbols, Executor& executor,
                     DenseObserver* observer, bool next);
   void map_surface(const DenseFrame& seen, const PixelRectangle& within, const FollowedFrame* from, bool next,

@@ -106,8 +106,8 @@ SurfaceSearch::SurfaceSearch(int letters, int window_px)
 
 std::size_t SurfaceSearch::bytes() const {
   const auto of = [](const auto& held) { return held.capacity() * sizeof held[0]; };
-  return of(open_) + of(places_) + of(scores_) + of(before_) + of(after_) + of(ways_) + of(depths_) + of(own_) +
-         of(longest_) + of(all_) + of(seeds_);
+  return of(open_) + of(places_) + of(known_) + of(scores_) + of(before_) + of(after_) + of(ways_) + of(depths_) +
+         of(own_) + of(longest_) + of(all_) + of(seeds_);
 }
 
 /// Chooses the known depths, and some around them.
@@ -206,30 +206,50 @@ void SurfaceSearch::compare(const PatternField& field, const SurfaceGrid& grid, 
   }
 }
 
-/// Learns the evidence of a correlation from windows of known depth: at that depth, and at all others.
-bool SurfaceSearch::learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid) {
+/// Compares a window of known depth with the pattern at that depth, and at some others.
+void SurfaceSearch::compare_known(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
+                                  const Eigen::Vector2i& known, std::size_t nth, Scratch& scratch,
+                                  Correlations& seen) const {
+  const Eigen::Vector2i place(grid.x_of(known.x()), grid.y_of(known.y()));
+  if (!read_window(frame, grid, place, scratch)) return;
+  const SurfaceNode& node = *grid.good(known.x(), known.y());
+  const auto level =
+      static_cast<int>(std::lround((static_cast<double>(node.plane.inverse_depth) - levels_.first) / levels_.step));
+  const int least = std::clamp(level - 1, 0, levels_.count - 1), most = std::clamp(level + 1, 0, levels_.count - 1);
+  compare(field, grid, place, least, most - least + 1, scratch);
+  const float best = level < -1 || level > levels_.count ? -1 : *std::ranges::max_element(scratch.alike);
+  ++seen.there[bin_of(best, kBins)];
+  const int wrong = std::min(kWrongLevels, levels_.count);
+  const int first = static_cast<int>(nth * kWrongLevels % static_cast<std::size_t>(levels_.count - wrong + 1));
+  compare(field, grid, place, first, wrong, scratch);
+  for (int k = 0; k < wrong; ++k)
+    if (std::abs(first + k - level) > kNearLevels) ++seen.elsewhere[bin_of(scratch.alike[k], kBins)];
+}
+
+/// Learns the evidence of a correlation from windows of known depth.
+bool SurfaceSearch::learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
+                          Executor& executor) {
+  constexpr std::size_t kAtOnce = 16;
+  const std::size_t step = std::max<std::size_t>(1, depths_.size() / kKnownMost);
+  known_.clear();
+  std::size_t nth = 0;
+  for (int row = 0; row < grid.rows(); ++row)
+    for (int column = 0; column < grid.columns(); ++column)
+      if (grid.good(column, row) != nullptr && nth++ % step == 0) known_.emplace_back(column, row);
+  std::vector<Correlations> of_workers(static_cast<std::size_t>(executor.workers()));
+  executor.run_ranges(
+      known_.size(),
+      [&](std::size_t first, std::size_t last, int worker) {
+        for (std::size_t i = first; i < last; ++i)
+          compare_known(frame, field, grid, known_[i], i * step + 1, scratch_[worker], of_workers[worker]);
+      },
+      kAtOnce);
   std::array<double, kBins> there{}, elsewhere{};
   double all_there = 0, all_elsewhere = 0;
-  const std::size_t step = std::max<std::size_t>(1, depths_.size() / kKnownMost);
-  std::size_t nth = 0;
-  for (int row = 0; row < grid.rows(); ++row) {
-    for (int column = 0; column < grid.columns(); ++column) {
-      const SurfaceNode* node = grid.good(column, row);
-      if (node == nullptr || nth++ % step != 0) continue;
-      Scratch& scratch = scratch_[0];
-      const Eigen::Vector2i place(grid.x_of(column), grid.y_of(row));
-      if (!read_window(frame, grid, place, scratch)) continue;
-      const auto level = static_cast<int>(
-          std::lround((static_cast<double>(node->plane.inverse_depth) - levels_.first) / levels_.step));
-      const int least = std::clamp(level - 1, 0, levels_.count - 1), most = std::clamp(level + 1, 0, levels_.count - 1);
-      compare(field, grid, place, least, most - least + 1, scratch);
-      const float best = level < -1 || level > levels_.count ? -1 : *std::ranges::max_element(scratch.alike);
-      const int wrong = std::min(kWrongLevels, levels_.count);
-      const int first = static_cast<int>(nth * kWrongLevels % static_cast<std::size_t>(levels_.count - wrong + 1));
-      compare(field, grid, place, first, wrong, scratch);
-      for (int k = 0; k < wrong; ++k)
-        if (std::abs(first + k - level) > kNearLevels) ++elsewhere[bin_of(scratch.alike[k], kBins)], ++all_elsewhere;
-      ++there[bin_of(best, kBins)], ++all_there;
+  for (const Correlations& seen : of_workers) {
+    for (int bin = 0; bin < kBins; ++bin) {
+      there[bin] += seen.there[bin], all_there += seen.there[bin];
+      elsewhere[bin] += seen.elsewhere[bin], all_elsewhere += seen.elsewhere[bin];
     }
   }
   if (all_there < kKnownLeast || all_elsewhere == 0) return false;
@@ -275,10 +295,13 @@ void SurfaceSearch::follow(const Lines& lines, bool forwards, const Take& take) 
 }
 
 /// Drops the places on no path with enough windows for the evidence: windows without contrast add none.
-void SurfaceSearch::drop_short_paths(const DenseFrame& frame, const SurfaceGrid& grid, const Lines& lines) {
+void SurfaceSearch::drop_short_paths(const DenseFrame& frame, const SurfaceGrid& grid, const Lines& lines,
+                                     Executor& executor) {
   std::vector<int>&own = own_, &longest = longest_, &all = all_;
   own.resize(places_.size()), all.assign(places_.size(), 0), longest.resize(places_.size());
-  for (std::size_t i = 0; i < places_.size(); ++i) own[i] = read_window(frame, grid, places_[i], scratch_[0]) ? 1 : 0;
+  executor.run_ranges(places_.size(), [&](std::size_t first, std::size_t last, int worker) {
+    for (std::size_t i = first; i < last; ++i) own[i] = read_window(frame, grid, places_[i], scratch_[worker]) ? 1 : 0;
+  });
   for (const bool forwards : {true, false}) {
     follow(lines, forwards, [&](std::int32_t open, const std::array<std::int32_t, 3>& others) {
       int before = 0;
@@ -374,9 +397,9 @@ std::span<const SurfaceSeed> SurfaceSearch::find(const DenseFrame& frame, const 
       find_open(grid, lines);
       if (places_.size() <= kPlacesMost) break;
     }
-    drop_short_paths(frame, grid, lines);
+    drop_short_paths(frame, grid, lines, executor);
     if (places_.empty()) continue;
-    if (!learnt && !(choose_levels(grid) && learn(frame, field, grid))) return seeds_;
+    if (!learnt && !(choose_levels(grid) && learn(frame, field, grid, executor))) return seeds_;
     learnt = true;
     weigh(frame, field, grid, executor);
     add_up(lines, true, before_);

@@ -54,17 +54,24 @@ class SurfaceSearch {
     float pixels = 0, squares = 0;  // number of the window's pixels, and sum of the squared levels
   };
   static constexpr int kBins = 16;
+  /// Numbers of windows by their correlation: at their depth, and at all others.
+  struct Correlations {
+    std::array<std::uint32_t, kBins> there{}, elsewhere{};
+  };
 
   [[nodiscard]] bool choose_levels(const SurfaceGrid& grid);
   [[nodiscard]] bool read_window(const DenseFrame& frame, const SurfaceGrid& grid, const Eigen::Vector2i& place,
                                  Scratch& scratch) const;
   void compare(const PatternField& field, const SurfaceGrid& grid, const Eigen::Vector2i& place, int first_level,
                int count, Scratch& scratch) const;
-  [[nodiscard]] bool learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid);
+  [[nodiscard]] bool learn(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
+                           Executor& executor);
+  void compare_known(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid,
+                     const Eigen::Vector2i& known, std::size_t nth, Scratch& scratch, Correlations& seen) const;
   void find_open(const SurfaceGrid& grid, const Lines& lines);
   template <class Take>
   void follow(const Lines& lines, bool forwards, const Take& take) const;
-  void drop_short_paths(const DenseFrame& frame, const SurfaceGrid& grid, const Lines& lines);
+  void drop_short_paths(const DenseFrame& frame, const SurfaceGrid& grid, const Lines& lines, Executor& executor);
   void weigh(const DenseFrame& frame, const PatternField& field, const SurfaceGrid& grid, Executor& executor);
   void add_up(const Lines& lines, bool forwards, std::vector<float>& best);
   void take_seeds();
@@ -77,6 +84,7 @@ class SurfaceSearch {
   std::vector<std::int32_t> open_;   // for each place: its scores, or -1
   std::vector<Eigen::Vector2i> places_;
   std::vector<float> scores_, before_, after_;  // for the open places, by level
+  std::vector<Eigen::Vector2i> known_;          // places in the grid of good nodes, evenly spread
   std::vector<float> ways_, depths_;
   std::vector<int> own_, longest_, all_;  // for the open places: windows with contrast, at the place and on its paths
   std::vector<Scratch> scratch_;

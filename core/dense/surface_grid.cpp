@@ -107,22 +107,24 @@ void SurfaceGrid::align(const DenseFrame& frame, const PatternField& field, Batc
   }
 }
 
-/// Aligns the active tasks, each with the field of its blur.
-void SurfaceGrid::align_by_blur(const DenseFrame& frame, const BlurredPattern& pattern, Batch& batch,
+/// Aligns some of the active tasks, each with the field of its blur.
+void SurfaceGrid::align_by_blur(const DenseFrame& frame, const BlurredPattern& pattern, Batch& batch, std::size_t first,
                                 std::size_t count) const {
+  const std::size_t last = first + count;
   const auto blur_of = [&](const PatchTask* task) {
     return batch.blurs[static_cast<std::size_t>(task - batch.tasks.data())];
   };
   if (pattern.levels() > 1) {
-    const auto unsorted = batch.active;
-    std::size_t sorted = 0;
+    std::array<PatchTask*, kBatchNodes> unsorted;
+    std::copy_n(batch.active.begin() + static_cast<std::ptrdiff_t>(first), count, unsorted.begin());
+    std::size_t sorted = first;
     for (int level = 0; level < pattern.levels(); ++level)
       for (std::size_t i = 0; i < count; ++i)
         if (blur_of(unsorted[i]) == level) batch.active[sorted++] = unsorted[i];
   }
-  for (std::size_t first = 0, end = 0; first < count; first = end) {
+  for (std::size_t end = first; first < last; first = end) {
     const std::uint8_t blur = blur_of(batch.active[first]);
-    while (end < count && blur_of(batch.active[end]) == blur) ++end;
+    while (end < last && blur_of(batch.active[end]) == blur) ++end;
     align(frame, pattern.field(blur), batch, first, end - first);
   }
 }
@@ -156,7 +158,7 @@ bool SurfaceGrid::accept(const PatchTask& task, SurfaceNode& node) const {
 /// Aligns every nth seed, at most a batch of them. @return number of tasks that began, at the batch's front
 std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const BlurredPattern& pattern,
                                     std::span<const SurfaceSeed> seeds, std::size_t first, std::size_t step,
-                                    Batch& batch) {
+                                    Batch& batch, Executor& executor) {
   std::size_t count = 0;
   for (std::size_t i = first; i < seeds.size() && count < kBatchNodes; i += step) {
     const std::int32_t index = node_at(seeds[i].camera_px);
@@ -171,27 +173,42 @@ std::size_t SurfaceGrid::align_some(const DenseFrame& frame, const BlurredPatter
     batch.blurs[count++] = static_cast<std::uint8_t>(pattern.level_at(task.map.middle_px, attempt.start.inverse_depth));
   }
   for (std::size_t i = 0; i < count; ++i) batch.active[i] = &batch.tasks[i];
-  align_by_blur(frame, pattern, batch, count);
+  executor.run_ranges(
+      count, [&](std::size_t from, std::size_t to, int) { align_by_blur(frame, pattern, batch, from, to - from); },
+      kAlignedAtOnce);
   return count;
 }
 
 BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const BlurredPattern& pattern,
-                                   std::span<const SurfaceSeed> seeds) {
+                                   std::span<const SurfaceSeed> seeds, Executor& executor) {
   const std::size_t step = (seeds.size() + kBatchNodes - 1) / kBatchNodes;
   if (batches_.empty()) batches_.resize(1);
   BlurSeen seen;
-  seen.tried = align_some(frame, pattern, seeds, step / 2, step, batches_[0]);
+  Batch& batch = batches_[0];
+  seen.tried = align_some(frame, pattern, seeds, step / 2, step, batch, executor);
+  struct Looked {
+    SurfaceNode node;
+    std::optional<PatchBlur> blur;
+  };
+  std::array<Looked, kBatchNodes> looked;
+  executor.run_ranges(
+      seen.tried,
+      [&](std::size_t first, std::size_t last, int) {
+        for (std::size_t i = first; i < last; ++i) {
+          if (!accept(batch.tasks[i], looked[i].node)) continue;
+          looked[i].blur = blur_of_patch(
+              frame.pixels, frame.full, pattern.field(batch.blurs[i]), kAlign,
+              {.patch = batch.tasks[i], .window_px = options_.window_px, .square_half_px = kEverywherePx});
+        }
+      },
+      kAlignedAtOnce);
   blur_meter_.clear(), blur_samples_.clear();
   for (std::size_t i = 0; i < seen.tried; ++i) {
-    SurfaceNode node;
-    const PatchTask& task = batches_[0].tasks[i];
-    if (!accept(task, node)) continue;
-    ++seen.aligned;
-    const PatternField& field = pattern.field(batches_[0].blurs[i]);
-    const auto variance =
-        blur_meter_.add(frame.pixels, frame.full, field, kAlign,
-                        {.patch = task, .window_px = options_.window_px, .square_half_px = kEverywherePx});
-    if (variance) blur_samples_.push_back({task.map.middle_px, node.plane.inverse_depth, *variance});
+    const auto& [node, blur] = looked[i];
+    seen.aligned += node.good ? 1 : 0;
+    if (!blur) continue;
+    blur_meter_.add(*blur);
+    blur_samples_.push_back({batch.tasks[i].map.middle_px, node.plane.inverse_depth, blur->variance});
   }
   seen.blur_px = changed_blur_px(pattern.usual().blur_sigma_px(), blur_meter_.change().value_or(0));
   seen.tone_change = blur_meter_.tone_change().value_or(0);
@@ -199,7 +216,7 @@ BlurSeen SurfaceGrid::look_at_blur(const DenseFrame& frame, const BlurredPattern
 }
 
 void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const BlurredPattern& pattern,
-                                       std::span<const SurfaceSeed> seeds, bool again) {
+                                       std::span<const SurfaceSeed> seeds, bool again, Executor& executor) {
   const Lens& lens = geometry_->camera.lens;
   if (batches_.empty()) batches_.resize(1);
   Batch& batch = batches_[0];
@@ -212,7 +229,7 @@ void SurfaceGrid::find_epipolar_offset(const DenseFrame& frame, const BlurredPat
   for (int round = again ? 1 : 0; round < 2; ++round) {
     offsets_.clear();
     for (std::size_t first = step / 2; first < seeds.size(); first += step * kBatchNodes) {
-      const std::size_t count = align_some(frame, pattern, seeds, first, step, batch);
+      const std::size_t count = align_some(frame, pattern, seeds, first, step, batch, executor);
       for (std::size_t i = 0; i < count; ++i) {
         SurfaceNode node;
         const PatchTask& task = batch.tasks[i];
@@ -369,7 +386,7 @@ void SurfaceGrid::grow_fronts(const DenseFrame& frame, const BlurredPattern& pat
             static_cast<std::uint8_t>(pattern.level_at(task.map.middle_px, front_[first + i].start.inverse_depth));
         batch.active[active++] = &task;
       }
-      align_by_blur(frame, pattern, batch, active);
+      align_by_blur(frame, pattern, batch, 0, active);
       for (std::size_t i = 0; i < in_part; ++i) {
         SurfaceNode& node = nodes_[front_[first + i].node];
         accepted_[first + i] = accept(batch.tasks[i], node);

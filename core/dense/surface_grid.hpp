@@ -123,14 +123,14 @@ class SurfaceGrid {
   /// Measures the blur of the frame at a sample of the seeds, see BlurMeter.
   /// @param pattern  as far as it is known
   [[nodiscard]] BlurSeen look_at_blur(const DenseFrame& frame, const BlurredPattern& pattern,
-                                      std::span<const SurfaceSeed> seeds);
+                                      std::span<const SurfaceSeed> seeds, Executor& executor);
   /// The blur at the samples of the last look_at_blur().
   [[nodiscard]] std::span<const BlurSample> blur_samples() const { return blur_samples_; }
 
   /// Measures at some seeds how far the pattern lies off its epipolar lines; later alignments start there.
   /// @param again  starts from the present offset, which was measured in this frame, so that one round is enough
   void find_epipolar_offset(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
-                            bool again = false);
+                            bool again, Executor& executor);
   [[nodiscard]] const EpipolarOffset& epipolar_offset() const { return epipolar_; }
   void set_epipolar_offset(const EpipolarOffset& offset) { epipolar_ = offset; }
   [[nodiscard]] std::size_t bytes() const;  ///< memory in use
@@ -187,6 +187,7 @@ class SurfaceGrid {
 
  private:
   static constexpr std::size_t kBatchNodes = 64;
+  static constexpr std::size_t kAlignedAtOnce = 2 * kEight;  // tasks of a batch that a worker aligns together
   static constexpr std::uint8_t kAttemptsMax = 4, kClosed = 255;
   struct Attempt {
     std::int32_t node;
@@ -213,9 +214,10 @@ class SurfaceGrid {
   [[nodiscard]] bool begin(const DenseFrame& frame, const Attempt& attempt, PatchTask& task) const;
   void align(const DenseFrame& frame, const PatternField& field, Batch& batch, std::size_t first,
              std::size_t count) const;
-  void align_by_blur(const DenseFrame& frame, const BlurredPattern& pattern, Batch& batch, std::size_t count) const;
+  void align_by_blur(const DenseFrame& frame, const BlurredPattern& pattern, Batch& batch, std::size_t first,
+                     std::size_t count) const;
   std::size_t align_some(const DenseFrame& frame, const BlurredPattern& pattern, std::span<const SurfaceSeed> seeds,
-                         std::size_t first, std::size_t step, Batch& batch);
+                         std::size_t first, std::size_t step, Batch& batch, Executor& executor);
   void offer(const Attempt& attempt);
   void offer_seed(std::int32_t index, const SurfaceSeed& seed);
   void forget_attempts();

@@ -376,14 +376,14 @@ class Check {
         if (const auto decoding = decoder.decode(frame.view(), 255, nullptr, &crew); !decoding) {
           return findings_.bad(name + ": " + to_string(decoding.error()));
         }
-        points = mapper.measure(frame.view(), 255, decoder.symbols(), crew).count(DensePixel::kMeasured);
+        points = mapper.measure(frame.view(), 255, decoder.symbols(crew), crew).count(DensePixel::kMeasured);
         least = std::min(least, std::chrono::steady_clock::now() - begin);
       }
       // Repeats the same frame: measures the memory that a stream keeps, and the time of the third run.
       auto still = std::chrono::steady_clock::duration::zero();
       for (int run = 0; run < kDenseRuns; ++run) {
         const auto begin = std::chrono::steady_clock::now();
-        (void)mapper.measure_next(frame.view(), 255, decoder.symbols(), crew);
+        (void)mapper.measure_next(frame.view(), 255, decoder.symbols(crew), crew);
         still = std::chrono::steady_clock::now() - begin;
       }
       const auto pixels = static_cast<std::size_t>(frame.width()) * static_cast<std::size_t>(frame.height());

@@ -224,31 +224,40 @@ void LetterAligner::ask(const LetterScene& scene, std::int32_t node, const Lette
 }
 
 /// Uses windows inside the cells: light from the neighbours falls farther out.
-void LetterAligner::align(const LetterScene& scene) {
+void LetterAligner::align_eight_of(const LetterScene& scene, std::span<AskedLetter> some) const {
   std::array<PatchTask*, kEight> eight;
-  for (std::size_t first = 0; first < asked_.size(); first += kEight) {
-    const std::size_t count = std::min<std::size_t>(kEight, asked_.size() - first);
-    float side_px = std::numeric_limits<float>::max();
-    for (std::size_t i = 0; i < count; ++i) {
-      eight[i] = &asked_[first + i].task;
-      side_px = std::min(side_px, pitch_px_ * asked_[first + i].place.frame.colwise().norm().minCoeff());
-    }
-    const int window_px = 2 * static_cast<int>(0.5F * side_px) + 1;
-    for (int step = 0; step < kSteps; ++step)
-      align_eight(scene.frame, scene.full, scene.letters, kAlign, window_px, {eight.data(), count});
+  float side_px = std::numeric_limits<float>::max();
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    eight[i] = &some[i].task;
+    side_px = std::min(side_px, pitch_px_ * some[i].place.frame.colwise().norm().minCoeff());
   }
-  for (AskedLetter& asked : asked_) {
-    const PatchTask& task = asked.task;
-    const int letter = letter_of(scene.seen.claims[asked.node]);
-    const Eigen::Vector2f middle = letters_->middle_px(letter) - task.map.origin_px.cast<float>();
-    const auto seen_at = [&](const Eigen::Vector2f& off) -> Eigen::Vector2f {
-      return task.map.middle_px + camera_offset(task.map, task.state, off);
-    };
-    asked.centre_px = seen_at(middle);
-    asked.centroid_px = seen_at(middle + scene.prototypes[letter].centroid_px);
-    const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
-    asked.tilt_px = 0.5F * pitch_px_ * (slopes * asked.place.frame).norm();
-  }
+  const int window_px = 2 * static_cast<int>(0.5F * side_px) + 1;
+  for (int step = 0; step < kSteps; ++step)
+    align_eight(scene.frame, scene.full, scene.letters, kAlign, window_px, {eight.data(), some.size()});
+}
+
+void LetterAligner::find_centre(const LetterScene& scene, AskedLetter& asked) const {
+  const PatchTask& task = asked.task;
+  const int letter = letter_of(scene.seen.claims[asked.node]);
+  const Eigen::Vector2f middle = letters_->middle_px(letter) - task.map.origin_px.cast<float>();
+  const auto seen_at = [&](const Eigen::Vector2f& off) -> Eigen::Vector2f {
+    return task.map.middle_px + camera_offset(task.map, task.state, off);
+  };
+  asked.centre_px = seen_at(middle);
+  asked.centroid_px = seen_at(middle + scene.prototypes[letter].centroid_px);
+  const Eigen::RowVector2f slopes(task.state.slope_x, task.state.slope_y);
+  asked.tilt_px = 0.5F * pitch_px_ * (slopes * asked.place.frame).norm();
+}
+
+void LetterAligner::align(const LetterScene& scene, Executor& executor) {
+  executor.run_ranges(
+      asked_.size(),
+      [&](std::size_t first, std::size_t last, int) {
+        const std::span<AskedLetter> some = std::span(asked_).subspan(first, last - first);
+        align_eight_of(scene, some);
+        for (AskedLetter& asked : some) find_centre(scene, asked);
+      },
+      kEight);
 }
 
 LightShares LetterAligner::shares_of_middle(const LetterScene& scene, const AskedLetter& asked) const {

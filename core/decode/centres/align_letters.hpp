@@ -14,6 +14,7 @@
 #include "core/decode/grid/cell_gate.hpp"
 #include "core/decode/grid/sightings.hpp"
 #include "core/decode/symbols/prototypes.hpp"
+#include "core/executor.hpp"
 #include "core/exposure/frame_noise.hpp"
 #include "core/image.hpp"
 
@@ -84,7 +85,7 @@ class LetterAligner {
   void clear() { asked_.clear(); }
   /// Queues a symbol at a place, unless its cell reaches beyond the frame there.
   void ask(const LetterScene& scene, std::int32_t node, const LetterPlace& place);
-  void align(const LetterScene& scene);
+  void align(const LetterScene& scene, Executor& executor);
   /// Returns the letters in the order in which they were asked.
   [[nodiscard]] std::vector<AskedLetter>& asked() { return asked_; }
   [[nodiscard]] const std::vector<AskedLetter>& asked() const { return asked_; }
@@ -101,6 +102,9 @@ class LetterAligner {
   void take_over(const LetterScene& scene, const AskedLetter& asked) const;
 
  private:
+  void align_eight_of(const LetterScene& scene, std::span<AskedLetter> some) const;
+  void find_centre(const LetterScene& scene, AskedLetter& asked) const;
+
   std::shared_ptr<const CodeArray> array_;
   float pitch_px_;
   std::shared_ptr<const LetterFields> letters_;

@@ -165,8 +165,10 @@ BlurSeen SymbolAligner::look_at_blur(const Developed& light, const BlurredPatter
     const PatchMap& map = cell.patch.map;
     const auto inverse_depth = static_cast<float>(map.reference_inverse_depth);
     const PatternField& field = pattern.field(pattern.level_at(map.middle_px, inverse_depth));
-    if (const auto variance = blur_meter_.add(light.pixels, light.full, field, {}, cell))
-      blur_samples_.push_back({map.middle_px, inverse_depth, *variance});
+    const auto blur = blur_of_patch(light.pixels, light.full, field, {}, cell);
+    if (!blur) continue;
+    blur_meter_.add(*blur);
+    blur_samples_.push_back({map.middle_px, inverse_depth, blur->variance});
   }
   seen.blur_px = changed_blur_px(pattern.usual().blur_sigma_px(), blur_meter_.change().value_or(0));
   seen.tone_change = blur_meter_.tone_change().value_or(0);

@@ -31,6 +31,8 @@ constexpr float kDoubtfulDistance = 2.5F, kDoubtfulAcrossPx = 0.25F, kSupportGoo
 /// Largest ratio of a printed symbol's light to its neighbours' light: print absorbs light.
 constexpr float kPrintedLightMax = 1.2F;
 
+constexpr std::size_t kAskedAtOnce = 16;  // letters that a worker takes together
+
 bool is_degraded(const CellGate& gate, const Sightings& seen, std::int32_t node) {
   const CellClaim& claim = seen.claims[node];
   if (!claim.named() || is_aligned(seen.aligned[node])) return false;
@@ -114,36 +116,56 @@ bool SymbolRecovery::shows_letter(const LetterScene& scene, const AskedLetter& a
   return claim.pass(rules_, DecodeRule::kRecoverUnlike, support >= (lone ? kLoneSupportMin : of_more));
 }
 
-void SymbolRecovery::recover_asked(const LetterScene& scene) {
+void SymbolRecovery::find_printed(const LetterScene& scene, Executor& executor) const {
+  const std::vector<AskedLetter>& all = aligner_.asked();
+  executor.run_ranges(
+      all.size(),
+      [&](std::size_t first, std::size_t last, int) {
+        for (std::size_t i = first; i < last; ++i) {
+          const AskedLetter& asked = all[i];
+          if (scene.seen.shapes[asked.node].is_well_seen()) continue;
+          const GreyMoments& light = scene.seen.moments[asked.node];
+          const bool brighter =
+              light.peak - light.background > kPrintedLightMax * (asked.place.peak - asked.place.background);
+          if (!brighter && !aligner_.shows_other_light(scene, asked))
+            scene.seen.aligned[asked.node] = Aligned::kPrinted;
+        }
+      },
+      kAskedAtOnce);
+}
+
+void SymbolRecovery::recover_asked(const LetterScene& scene, Executor& executor) {
   aligner_.clear();
   for (const std::int32_t node : to_ask_)
     if (const LetterPlace place = place_by_neighbours(scene.seen, node); place.supported_by > 0)
       aligner_.ask(scene, node, place);
-  for (const AskedLetter& asked : aligner_.asked()) {
-    if (scene.seen.shapes[asked.node].is_well_seen()) continue;
-    const GreyMoments& light = scene.seen.moments[asked.node];
-    const bool brighter =
-        light.peak - light.background > kPrintedLightMax * (asked.place.peak - asked.place.background);
-    if (!brighter && !aligner_.shows_other_light(scene, asked)) scene.seen.aligned[asked.node] = Aligned::kPrinted;
-  }
-  aligner_.align(scene);
+  find_printed(scene, executor);
+  aligner_.align(scene, executor);
   // Check all before any is recovered, so that their order has no effect.
-  std::erase_if(aligner_.asked(), [&](const AskedLetter& asked) {
-    return !lies_there(scene.seen, asked) || !shows_letter(scene, asked);
-  });
-  for (const AskedLetter& asked : aligner_.asked()) {
+  const std::vector<AskedLetter>& all = aligner_.asked();
+  shown_.resize(all.size());
+  executor.run_ranges(
+      all.size(),
+      [&](std::size_t first, std::size_t last, int) {
+        for (std::size_t i = first; i < last; ++i)
+          shown_[i] = lies_there(scene.seen, all[i]) && shows_letter(scene, all[i]) ? 1 : 0;
+      },
+      kAskedAtOnce);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (shown_[i] == 0) continue;
+    const AskedLetter& asked = all[i];
     aligner_.take_over(scene, asked);
     restore_links(scene.seen, asked.node);
     recovered_.push_back(asked.node);
   }
 }
 
-const std::vector<std::int32_t>& SymbolRecovery::recover(const LetterScene& scene) {
+const std::vector<std::int32_t>& SymbolRecovery::recover(const LetterScene& scene, Executor& executor) {
   recovered_.clear();
   ask_all(scene);
   while (!to_ask_.empty()) {
     const std::size_t before = recovered_.size();
-    recover_asked(scene);
+    recover_asked(scene, executor);
     ask_beside(scene, before);
   }
   std::ranges::sort(recovered_);

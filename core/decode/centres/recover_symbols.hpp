@@ -22,12 +22,13 @@ class SymbolRecovery {
   /// Recovered symbols get a new place, frame, light, shape and misfit, and then hold their neighbours.
   /// @param scene  its claims are proposals
   /// @return       the recovered sightings, in order; valid until the next call
-  const std::vector<std::int32_t>& recover(const LetterScene& scene);
+  const std::vector<std::int32_t>& recover(const LetterScene& scene, Executor& executor);
 
  private:
   void ask_all(const LetterScene& scene);
   void ask_beside(const LetterScene& scene, std::size_t first);
-  void recover_asked(const LetterScene& scene);
+  void find_printed(const LetterScene& scene, Executor& executor) const;
+  void recover_asked(const LetterScene& scene, Executor& executor);
   [[nodiscard]] bool lies_there(Sightings& seen, const AskedLetter& asked) const;
   [[nodiscard]] bool shows_letter(const LetterScene& scene, const AskedLetter& asked) const;
 
@@ -35,6 +36,7 @@ class SymbolRecovery {
   Rules rules_;
   LetterAligner aligner_;
   std::vector<std::int32_t> to_ask_, recovered_;  // sightings
+  std::vector<std::uint8_t> shown_;               // for each asked letter
 };
 
 }  // namespace slsd

@@ -25,37 +25,41 @@ bool contradicts(const NodesSeen& seen, const LetterEvidence& letters, std::int3
 
 }  // namespace
 
-void EdgePrior::find_cut(const NodesSeen& seen, const LetterEvidence& letters) {
+void EdgePrior::find_cut(const NodesSeen& seen, const LetterEvidence& letters, Executor& executor) {
   cut_.assign(seen.nodes.size(), {});
-  for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
-    const auto node = static_cast<std::int32_t>(i);
-    for (const Direction d : kDirections) {
-      const std::int32_t other = seen.nodes[i].links[d];
-      if (other < 0) continue;
-      cut_[i][d] = seen.nodes[i].broken[d] || contradicts(seen, letters, node, other, d) ||
-                   contradicts(seen, letters, other, node, opposite(d));
+  executor.run_ranges(seen.nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      const auto node = static_cast<std::int32_t>(i);
+      for (const Direction d : kDirections) {
+        const std::int32_t other = seen.nodes[i].links[d];
+        if (other < 0) continue;
+        cut_[i][d] = seen.nodes[i].broken[d] || contradicts(seen, letters, node, other, d) ||
+                     contradicts(seen, letters, other, node, opposite(d));
+      }
     }
-  }
+  });
 }
 
-void EdgePrior::spread(const NodesSeen& seen) {
+void EdgePrior::spread(const NodesSeen& seen, Executor& executor) {
   constexpr float kOfFive = 0.2F;
   next_ = counts_;
-  for (std::size_t i = 0; i < counts_.size(); ++i) {
-    Count& sum = next_[i];
-    for (const Direction d : kDirections) {
-      const std::int32_t other = seen.nodes[i].links[d];
-      if (other < 0) continue;
-      for (const int along : {0, 1})
-        sum.links[along] += counts_[other].links[along], sum.cut[along] += counts_[other].cut[along];
+  executor.run_ranges(counts_.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      Count& sum = next_[i];
+      for (const Direction d : kDirections) {
+        const std::int32_t other = seen.nodes[i].links[d];
+        if (other < 0) continue;
+        for (const int along : {0, 1})
+          sum.links[along] += counts_[other].links[along], sum.cut[along] += counts_[other].cut[along];
+      }
+      for (const int along : {0, 1}) sum.links[along] *= kOfFive, sum.cut[along] *= kOfFive;
     }
-    for (const int along : {0, 1}) sum.links[along] *= kOfFive, sum.cut[along] *= kOfFive;
-  }
+  });
   counts_.swap(next_);
 }
 
-void EdgePrior::measure(const NodesSeen& seen, const LetterEvidence& letters) {
-  find_cut(seen, letters);
+void EdgePrior::measure(const NodesSeen& seen, const LetterEvidence& letters, Executor& executor) {
+  find_cut(seen, letters, executor);
   counts_.assign(seen.nodes.size(), {});
   float links = 2, cut = 1;  // pseudo-counts
   for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
@@ -74,7 +78,7 @@ void EdgePrior::measure(const NodesSeen& seen, const LetterEvidence& letters) {
     }
   }
   const float usual_share = std::clamp(cut / links, kShareMin, kUsualMax);
-  for (int link = 0; link < kSpreadLinks; ++link) spread(seen);
+  for (int link = 0; link < kSpreadLinks; ++link) spread(seen, executor);
   odds_.resize(counts_.size());
   for (std::size_t i = 0; i < counts_.size(); ++i)
     for (const std::size_t along : {0, 1})

@@ -10,6 +10,7 @@
 #include "core/decode/grid/link_grid.hpp"
 #include "core/decode/inference/letter_evidence.hpp"
 #include "core/decode/inference/surface_links.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 
@@ -18,7 +19,7 @@ namespace slsd {
 /// @thread thread-bound: keeps its buffers
 class EdgePrior {
  public:
-  void measure(const NodesSeen& seen, const LetterEvidence& letters);
+  void measure(const NodesSeen& seen, const LetterEvidence& letters, Executor& executor);
 
   /// Log-odds that no edge crosses a link of the node.
   [[nodiscard]] float log_odds(std::size_t node, Direction d) const { return odds_[node][d % 2]; }
@@ -30,8 +31,8 @@ class EdgePrior {
   struct Count {
     std::array<float, 2> links{}, cut{};
   };
-  void find_cut(const NodesSeen& seen, const LetterEvidence& letters);
-  void spread(const NodesSeen& seen);
+  void find_cut(const NodesSeen& seen, const LetterEvidence& letters, Executor& executor);
+  void spread(const NodesSeen& seen, Executor& executor);
   [[nodiscard]] static float odds_of(float links, float cut, float usual_share);
 
   std::vector<std::array<bool, 4>> cut_;

@@ -109,6 +109,10 @@ float EvidenceFlow::draw_once(std::int32_t node, float wanted, Budget& budget) {
   return drawn;
 }
 
+void EvidenceFlow::reserve() {
+  for (std::vector<std::int32_t>* buffer : {&queue_, &touched_, &touched_lines_}) buffer->reserve(supply_.size());
+}
+
 float EvidenceFlow::draw(std::int32_t node, float wanted, Budget budget) {
   float drawn = 0;
   while (drawn < wanted - kNothing) {

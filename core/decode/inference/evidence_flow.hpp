@@ -43,6 +43,8 @@ class EvidenceFlow {
   /// @return  the nats drawn
   float draw(std::int32_t node, float wanted, Budget budget = kUnlimited);
 
+  /// Makes room for searches: a copy has none.
+  void reserve();
   /// Saves what is left, and restores it after draws.
   void keep();
   void restore();

@@ -173,6 +173,7 @@ void CellInference::measure_margins(Executor& executor) {
   flow_.keep();
   helpers_.resize(static_cast<std::size_t>(executor.workers()) - 1);
   for (EvidenceFlow& helper : helpers_) helper = flow_;
+  for (int worker = 0; worker < executor.workers(); ++worker) flow_of(worker).reserve();
   margins_.assign(labels_.size(), 0);
   const float margin_max = rules_.whole_margins() ? margin_needed_ - margin_min_ + kMarginMax : margin_needed_;
   executor.run_ranges(labels_.size(), [&](std::size_t first, std::size_t last, int worker) {
@@ -296,10 +297,10 @@ void CellInference::decide(const CellGate& gate, Executor& executor, Sightings& 
   labels_ = proposed_;
   nats_.resize(labels_.size());
   letters_.look_at(seen.shapes, seen.aligned);
-  links_.measure(view_of(seen), letters_, gate);
+  links_.measure(view_of(seen), letters_, gate, executor);
   letters_.measure_split(beside_, labels_);
   drop_misread();
-  prior_.measure(view_of(seen), letters_);
+  prior_.measure(view_of(seen), letters_, executor);
   set_capacities();
   fill_flow();
   draw_contradictions();

@@ -37,23 +37,26 @@ float normal(float x, float sigma) {
 
 }  // namespace
 
-void SurfaceLinks::measure_bends(const NodesSeen& seen, const CellGate& gate, const CellGrid& grid) {
+void SurfaceLinks::measure_bends(const NodesSeen& seen, const CellGate& gate, const CellGrid& grid,
+                                 Executor& executor) {
   bends_.assign(seen.nodes.size(), {Eigen::Vector2f(kUnknown, kUnknown), Eigen::Vector2f(kUnknown, kUnknown)});
-  for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
-    const GridNode& node = seen.nodes[i];
-    const std::int32_t cell = seen.labels[i];
-    if (cell < 0) continue;
-    const Eigen::Vector2f along =
-        gate.way_of_line(static_cast<std::int32_t>(i), grid.row_of(cell), grid.column_of(cell));
-    const Eigen::Matrix2f cells_from_camera = node.frame.inverse() / pitch_px_;
-    for (const Direction d : {kRight, kDown}) {
-      const std::int32_t on = seen.beside[i][d], behind = seen.beside[i][opposite(d)];
-      if (on < 0 || behind < 0) continue;
-      const Eigen::Vector2f bend =
-          cells_from_camera * (seen.nodes[on].centre_px + seen.nodes[behind].centre_px - 2 * node.centre_px);
-      bends_[i][d] = {along.dot(bend), along.x() * bend.y() - along.y() * bend.x()};
+  executor.run_ranges(seen.nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      const GridNode& node = seen.nodes[i];
+      const std::int32_t cell = seen.labels[i];
+      if (cell < 0) continue;
+      const Eigen::Vector2f along =
+          gate.way_of_line(static_cast<std::int32_t>(i), grid.row_of(cell), grid.column_of(cell));
+      const Eigen::Matrix2f cells_from_camera = node.frame.inverse() / pitch_px_;
+      for (const Direction d : {kRight, kDown}) {
+        const std::int32_t on = seen.beside[i][d], behind = seen.beside[i][opposite(d)];
+        if (on < 0 || behind < 0) continue;
+        const Eigen::Vector2f bend =
+            cells_from_camera * (seen.nodes[on].centre_px + seen.nodes[behind].centre_px - 2 * node.centre_px);
+        bends_[i][d] = {along.dot(bend), along.x() * bend.y() - along.y() * bend.x()};
+      }
     }
-  }
+  });
 }
 
 float SurfaceLinks::usual_slip(const NodesSeen& seen, const LetterEvidence& letters) {
@@ -68,31 +71,33 @@ float SurfaceLinks::usual_slip(const NodesSeen& seen, const LetterEvidence& lett
   return sample_.size() < kSamplesMin ? kUsualSlip : median_in_place(sample_);
 }
 
-void SurfaceLinks::measure_slips(const NodesSeen& seen, float least) {
+void SurfaceLinks::measure_slips(const NodesSeen& seen, float least, Executor& executor) {
   nats_.assign(seen.nodes.size(), {});
-  for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
-    for (const Direction d : {kRight, kDown}) {
-      const std::int32_t other = seen.beside[i][d];
-      if (other < 0 || seen.nodes[i].split || seen.nodes[other].split) continue;
-      float most = 0;  // density
-      const auto compare = [&](std::int32_t from, Direction way) {
-        const Eigen::Vector2f bend = bends_[from][way % 2];
-        if (std::isnan(bend.x())) return;
-        const std::int32_t behind = seen.beside[from][opposite(way)];
-        if (seen.nodes[behind].split) return;
-        float before = bends_[behind][way % 2].x();
-        if (before * bend.x() < 0) before = 0;  // one displaced symbol bends its neighbours the other way
-        const float variance =
-            least * least + 0.5F * bend.y() * bend.y() + (std::isnan(before) ? 0.F : 0.25F * before * before);
-        const float width = std::min(std::sqrt(variance), kSlipWidthMax);
-        most = std::max(most, student(bend.x(), width));
-      };
-      compare(static_cast<std::int32_t>(i), d);
-      compare(other, opposite(d));
-      if (most == 0) continue;
-      nats_[i][d] = nats_[other][opposite(d)] = std::max(std::log(most * kSlipRange), kNatsMin);
+  executor.run_ranges(seen.nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      for (const Direction d : {kRight, kDown}) {
+        const std::int32_t other = seen.beside[i][d];
+        if (other < 0 || seen.nodes[i].split || seen.nodes[other].split) continue;
+        float most = 0;  // density
+        const auto compare = [&](std::int32_t from, Direction way) {
+          const Eigen::Vector2f bend = bends_[from][way % 2];
+          if (std::isnan(bend.x())) return;
+          const std::int32_t behind = seen.beside[from][opposite(way)];
+          if (seen.nodes[behind].split) return;
+          float before = bends_[behind][way % 2].x();
+          if (before * bend.x() < 0) before = 0;  // one displaced symbol bends its neighbours the other way
+          const float variance =
+              least * least + 0.5F * bend.y() * bend.y() + (std::isnan(before) ? 0.F : 0.25F * before * before);
+          const float width = std::min(std::sqrt(variance), kSlipWidthMax);
+          most = std::max(most, student(bend.x(), width));
+        };
+        compare(static_cast<std::int32_t>(i), d);
+        compare(other, opposite(d));
+        if (most == 0) continue;
+        nats_[i][d] = nats_[other][opposite(d)] = std::max(std::log(most * kSlipRange), kNatsMin);
+      }
     }
-  }
+  });
 }
 
 void SurfaceLinks::measure_light(const NodesSeen& seen, const LetterEvidence& letters) {
@@ -113,7 +118,7 @@ void SurfaceLinks::measure_light(const NodesSeen& seen, const LetterEvidence& le
   }
 }
 
-void SurfaceLinks::add_light(const NodesSeen& seen, const CellGrid& grid) {
+void SurfaceLinks::add_light(const NodesSeen& seen, const CellGrid& grid, Executor& executor) {
   const auto difference = [&](std::size_t i, Direction d) {
     const std::int32_t other = seen.beside[i][d];
     if (other < 0 || seen.labels[i] < 0 || seen.labels[other] != grid.beyond(seen.labels[i], d)) return kUnknown;
@@ -127,33 +132,36 @@ void SurfaceLinks::add_light(const NodesSeen& seen, const CellGrid& grid) {
   constexpr float kWidthOfMedian = 1.35F;  // for Student's t with four degrees of freedom: 1 / its quartile
   const float width = std::clamp(kWidthOfMedian * median_in_place(sample_), kLightMin, kLightMax);
   constexpr float kOfBefore = 0.5F;  // towards a limb, light falls faster from link to link
-  for (std::size_t i = 0; i < seen.nodes.size(); ++i) {
-    for (const Direction d : {kRight, kDown}) {
-      const float by = difference(i, d);
-      if (std::isnan(by)) continue;
-      const float across = normal(by, kLightAcross);
-      float most = student(by, width);  // density
-      if (most >= across) continue;
-      const auto compare = [&](float before) {
-        if (!(before * by >= 0)) return;
-        most = std::max(most, student(by, std::min(std::hypot(width, kOfBefore * before), kLightWidthMax)));
-      };
-      const std::int32_t on = seen.beside[i][d], behind = seen.beside[i][opposite(d)];
-      if (behind >= 0) compare(difference(behind, d));
-      compare(difference(on, d));
-      const float nats = std::clamp(std::log(most / across), kLightNatsMin, 0.F);
-      nats_[i][d] += nats;
-      nats_[seen.beside[i][d]][opposite(d)] += nats;
+  executor.run_ranges(seen.nodes.size(), [&](std::size_t first, std::size_t last, int) {
+    for (std::size_t i = first; i < last; ++i) {
+      for (const Direction d : {kRight, kDown}) {
+        const float by = difference(i, d);
+        if (std::isnan(by)) continue;
+        const float across = normal(by, kLightAcross);
+        float most = student(by, width);  // density
+        if (most >= across) continue;
+        const auto compare = [&](float before) {
+          if (!(before * by >= 0)) return;
+          most = std::max(most, student(by, std::min(std::hypot(width, kOfBefore * before), kLightWidthMax)));
+        };
+        const std::int32_t on = seen.beside[i][d], behind = seen.beside[i][opposite(d)];
+        if (behind >= 0) compare(difference(behind, d));
+        compare(difference(on, d));
+        const float nats = std::clamp(std::log(most / across), kLightNatsMin, 0.F);
+        nats_[i][d] += nats;
+        nats_[seen.beside[i][d]][opposite(d)] += nats;
+      }
     }
-  }
+  });
 }
 
-void SurfaceLinks::measure(const NodesSeen& seen, const LetterEvidence& letters, const CellGate& gate) {
-  measure_bends(seen, gate, letters.grid());
+void SurfaceLinks::measure(const NodesSeen& seen, const LetterEvidence& letters, const CellGate& gate,
+                           Executor& executor) {
+  measure_bends(seen, gate, letters.grid(), executor);
   constexpr float kWidthOfUsual = 1.5F;
-  measure_slips(seen, std::clamp(kWidthOfUsual * usual_slip(seen, letters), kSlipMin, kSlipMax));
+  measure_slips(seen, std::clamp(kWidthOfUsual * usual_slip(seen, letters), kSlipMin, kSlipMax), executor);
   measure_light(seen, letters);
-  add_light(seen, letters.grid());
+  add_light(seen, letters.grid(), executor);
 }
 
 }  // namespace slsd

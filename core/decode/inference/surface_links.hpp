@@ -12,6 +12,7 @@
 #include "core/decode/grid/neighbourhood.hpp"
 #include "core/decode/inference/letter_evidence.hpp"
 #include "core/decode/symbols/grey_moments.hpp"
+#include "core/executor.hpp"
 
 namespace slsd {
 
@@ -37,7 +38,7 @@ class SurfaceLinks {
  public:
   explicit SurfaceLinks(float pitch_px) : pitch_px_(pitch_px) {}
 
-  void measure(const NodesSeen& seen, const LetterEvidence& letters, const CellGate& gate);
+  void measure(const NodesSeen& seen, const LetterEvidence& letters, const CellGate& gate, Executor& executor);
 
   /// Returns a node's links by Direction; 0 for links without evidence.
   [[nodiscard]] const std::array<float, 4>& of(std::size_t node) const { return nats_[node]; }
@@ -45,11 +46,11 @@ class SurfaceLinks {
   [[nodiscard]] float slip(std::size_t node, Direction d) const { return bends_[node][d % 2].x(); }
 
  private:
-  void measure_bends(const NodesSeen& seen, const CellGate& gate, const CellGrid& grid);
+  void measure_bends(const NodesSeen& seen, const CellGate& gate, const CellGrid& grid, Executor& executor);
   [[nodiscard]] float usual_slip(const NodesSeen& seen, const LetterEvidence& letters);
-  void measure_slips(const NodesSeen& seen, float least);
+  void measure_slips(const NodesSeen& seen, float least, Executor& executor);
   void measure_light(const NodesSeen& seen, const LetterEvidence& letters);
-  void add_light(const NodesSeen& seen, const CellGrid& grid);
+  void add_light(const NodesSeen& seen, const CellGrid& grid, Executor& executor);
 
   float pitch_px_;
   std::vector<std::array<Eigen::Vector2f, 2>> bends_;  // along rows and columns: components along the epipolar line,

@@ -29,18 +29,15 @@ inline __attribute__((always_inline)) void light_run(const T* pixels, int count,
 
 }  // namespace
 
-/// Appends the parts of a region, one or more, and empties it. Leaves the region alone if nothing separates it.
-void RegionSeparator::split(const GreyView& frame, float contrast_min, std::size_t index, Regions& regions) {
-  const Region region = regions.regions[index];
-  std::visit([&](const auto& view) { find_parts(view, region, regions.runs_of(region), contrast_min); }, frame);
-  if (parts_.regions.empty()) return;
-  if (parts_.regions.size() == 1 && parts_.regions[0].area_px == region.area_px) return;
-  for (const Region& part : parts_.regions) regions.append(part, parts_.runs_of(part));
-  regions.regions[index].area_px = 0;
+const Regions& RegionSplitter::split(const GreyView& frame, float contrast_min, const Region& region,
+                                     std::span<const Run> runs) {
+  std::visit([&](const auto& view) { find_parts(view, region, runs, contrast_min); }, frame);
+  if (parts_.regions.size() == 1 && parts_.regions[0].area_px == region.area_px) parts_.regions.clear();
+  return parts_;
 }
 
 template <class Visit>
-void RegionSeparator::visit_around(int column, int row, Visit&& visit) const {
+void RegionSplitter::visit_around(int column, int row, Visit&& visit) const {
   for (int r = std::max(row - 1, 0); r <= std::min(row + 1, rows_ - 1); ++r) {
     for (int c = std::max(column - 1, 0); c <= std::min(column + 1, columns_ - 1); ++c) visit(r * columns_ + c);
   }
@@ -48,7 +45,7 @@ void RegionSeparator::visit_around(int column, int row, Visit&& visit) const {
 
 /// Finds the range of each column over the rows of a tile, and then over the columns of a tile.
 template <class T>
-void RegionSeparator::measure_tiles(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+void RegionSplitter::measure_tiles(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
   const int tile = options_.tile_px, width = region.width_px();
   columns_ = (width + tile - 1) / tile, rows_ = (region.height_px() + tile - 1) / tile;
   tiles_.assign(static_cast<std::size_t>(columns_) * rows_, {std::numeric_limits<float>::max(), kNone});
@@ -79,7 +76,7 @@ void RegionSeparator::measure_tiles(const ImageView<T>& frame, const Region& reg
 }
 
 /// Sets thresholds as binarize does: midway within 3x3 tiles, then the mean of 3x3 of these.
-void RegionSeparator::set_thresholds(float contrast_min) {
+void RegionSplitter::set_thresholds(float contrast_min) {
   midway_.assign(tiles_.size(), kNone);
   threshold_.assign(tiles_.size(), 0);
   for (int row = 0; row < rows_; ++row) {
@@ -107,7 +104,7 @@ void RegionSeparator::set_thresholds(float contrast_min) {
 }
 
 /// Interpolates the thresholds of a row of tiles to a row of pixels.
-void RegionSeparator::interpolate(int row) {
+void RegionSplitter::interpolate(int row) {
   const float v = std::clamp((static_cast<float>(row) + 0.5F) / static_cast<float>(options_.tile_px) - 0.5F, 0.F,
                              static_cast<float>(rows_ - 1));
   const int above = static_cast<int>(v), below = std::min(above + 1, rows_ - 1);
@@ -121,7 +118,7 @@ void RegionSeparator::interpolate(int row) {
 
 /// Lights pixels above the thresholds, interpolated between the tiles' centres.
 template <class T>
-void RegionSeparator::compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
+void RegionSplitter::compare(const ImageView<T>& frame, const Region& region, std::span<const Run> runs) {
   const auto tile = static_cast<float>(options_.tile_px);
   const int width = region.width_px(), words = (width + Mask::kWordPx - 1) / Mask::kWordPx;
   mask_.clear(width, region.height_px());
@@ -146,8 +143,8 @@ void RegionSeparator::compare(const ImageView<T>& frame, const Region& region, s
 }
 
 template <class T>
-void RegionSeparator::find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
-                                 float contrast_min) {
+void RegionSplitter::find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs,
+                                float contrast_min) {
   measure_tiles(frame, region, runs);
   set_thresholds(contrast_min);
   compare(frame, region, runs);
@@ -163,7 +160,30 @@ void RegionSeparator::find_parts(const ImageView<T>& frame, const Region& region
   }
 }
 
-template void RegionSeparator::find_parts(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>, float);
-template void RegionSeparator::find_parts(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>, float);
+/// Appends the parts of the asked regions in their order, and empties these.
+void RegionSeparator::split_asked(const GreyView& frame, float contrast_min, Regions& regions, Executor& executor) {
+  const auto first_of = [&](std::size_t share) { return share * asked_.size() / shares_.size(); };
+  executor.run(static_cast<int>(shares_.size()), [&](int number, int) {
+    Share& share = shares_[number];
+    share.parts.regions.clear(), share.parts.runs.clear(), share.ends.clear();
+    for (std::size_t i = first_of(number); i < first_of(number + 1); ++i) {
+      const Region& region = regions.regions[asked_[i]];
+      const Regions& found = share.splitter.split(frame, contrast_min, region, regions.runs_of(region));
+      for (const Region& part : found.regions) share.parts.append(part, found.runs_of(part));
+      share.ends.push_back(share.parts.regions.size());
+    }
+  });
+  for (std::size_t number = 0; number < shares_.size(); ++number) {
+    const auto& [splitter, parts, ends] = shares_[number];
+    std::size_t part = 0;
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      if (part < ends[i]) regions.regions[asked_[first_of(number) + i]].area_px = 0;
+      for (; part < ends[i]; ++part) regions.append(parts.regions[part], parts.runs_of(parts.regions[part]));
+    }
+  }
+}
+
+template void RegionSplitter::find_parts(const ImageView<std::uint8_t>&, const Region&, std::span<const Run>, float);
+template void RegionSplitter::find_parts(const ImageView<std::uint16_t>&, const Region&, std::span<const Run>, float);
 
 }  // namespace slsd

@@ -4,8 +4,10 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "core/executor.hpp"
 #include "core/image.hpp"
 #include "core/regions/find_regions.hpp"
 
@@ -20,42 +22,22 @@ struct SeparateOptions {
   int rounds = 4;
 };
 
-/// Splits regions in which symbols have run together: blur has filled the gaps, or a lit surface ends before a dark
-/// background and everything on it is bright. The splitter computes new thresholds from the region's own pixels, tile
-/// by tile. So darkness beside the region has no influence, and light may fall off over it.
+/// Splits a region by new thresholds, which it computes from the region's own pixels, tile by tile. So darkness beside
+/// the region has no influence, and light may fall off over it.
 /// @thread thread-bound: keeps its buffers
-class RegionSeparator {
+class RegionSplitter {
  public:
-  explicit RegionSeparator(SeparateOptions options) : options_(options) {}
+  explicit RegionSplitter(SeparateOptions options) : options_(options) {}
 
-  /// Splits every `merged` region, and its parts as long as they are merged.
   /// @param contrast_min  smallest difference between light and dark inside a region, levels of the frame
-  /// @param merged        bool(const Region&)
-  template <class Merged>
-  void separate_all(const GreyView& frame, float contrast_min, Regions& regions, Merged&& merged) {
-    suspects_.clear();
-    const auto suspect_from = [&](std::size_t first) {
-      for (std::size_t i = first; i < regions.regions.size(); ++i)
-        if (merged(regions.regions[i])) suspects_.push_back(i);
-    };
-    suspect_from(0);
-    if (suspects_.empty()) return;
-    for (int round = 0; round < options_.rounds && !suspects_.empty(); ++round) {
-      asked_.swap(suspects_);
-      suspects_.clear();
-      const std::size_t first_part = regions.regions.size();
-      for (const std::size_t i : asked_) split(frame, contrast_min, i, regions);
-      suspect_from(first_part);
-    }
-    std::erase_if(regions.regions, [](const Region& region) { return region.area_px == 0; });
-  }
+  /// @return the parts, one or more; none if nothing separates the region. Valid until the next call.
+  const Regions& split(const GreyView& frame, float contrast_min, const Region& region, std::span<const Run> runs);
 
  private:
   /// Range of a region's pixels in a tile of its box.
   struct TileRange {
     float least, greatest;
   };
-  void split(const GreyView& frame, float contrast_min, std::size_t index, Regions& regions);
   template <class T>
   void find_parts(const ImageView<T>& frame, const Region& region, std::span<const Run> runs, float contrast_min);
   template <class T>
@@ -78,6 +60,54 @@ class RegionSeparator {
   Mask mask_;
   RegionFinder finder_;
   Regions parts_;
+};
+
+/// Splits regions in which symbols have run together: blur has filled the gaps, or a lit surface ends before a dark
+/// background and everything on it is bright.
+/// @thread thread-bound: keeps its buffers
+class RegionSeparator {
+ public:
+  explicit RegionSeparator(SeparateOptions options) : options_(options), shares_(kShares, {RegionSplitter(options)}) {}
+
+  /// Splits every `merged` region, and its parts as long as they are merged.
+  /// @param contrast_min  as for RegionSplitter
+  /// @param merged        bool(const Region&)
+  template <class Merged>
+  void separate_all(const GreyView& frame, float contrast_min, Regions& regions, Merged&& merged, Executor& executor) {
+    suspects_.clear();
+    const auto suspect_from = [&](std::size_t first) {
+      for (std::size_t i = first; i < regions.regions.size(); ++i)
+        if (merged(regions.regions[i])) suspects_.push_back(i);
+    };
+    suspect_from(0);
+    if (suspects_.empty()) return;
+    for (int round = 0; round < options_.rounds && !suspects_.empty(); ++round) {
+      asked_.swap(suspects_);
+      suspects_.clear();
+      const std::size_t first_part = regions.regions.size();
+      split_asked(frame, contrast_min, regions, executor);
+      suspect_from(first_part);
+    }
+    std::erase_if(regions.regions, [](const Region& region) { return region.area_px == 0; });
+  }
+  template <class Merged>
+  void separate_all(const GreyView& frame, float contrast_min, Regions& regions, Merged&& merged) {
+    SerialExecutor alone;
+    separate_all(frame, contrast_min, regions, std::forward<Merged>(merged), alone);
+  }
+
+ private:
+  static constexpr std::size_t kShares = 8;  // whatever the number of workers, so that buffers grow alike
+  /// Some of the asked regions, and their parts one after the other.
+  struct Share {
+    RegionSplitter splitter;
+    Regions parts{};
+    std::vector<std::size_t> ends{};  // for each of the regions: the end of its parts
+  };
+  void split_asked(const GreyView& frame, float contrast_min, Regions& regions, Executor& executor);
+
+  SeparateOptions options_;
+  std::vector<Share> shares_;
   std::vector<std::size_t> suspects_, asked_;
 };
 

@@ -94,8 +94,9 @@ void ShapeFinder::find_regions(const GreyView& frame, Executor& executor) {
   if (part_) mask_.keep(part_->left, part_->top, part_->right, part_->bottom);
   region_finder_.find(mask_, regions_, executor);
   if (find_regions_ == Method::kPaper) return;
-  separator_.separate_all(frame, std::max(binarizer_.contrast_min(0), kContrastMin * frame_levels_), regions_,
-                          [this](const Region& region) { return is_too_large(region, scale_at(region)); });
+  separator_.separate_all(
+      frame, std::max(binarizer_.contrast_min(0), kContrastMin * frame_levels_), regions_,
+      [this](const Region& region) { return is_too_large(region, scale_at(region)); }, executor);
 }
 
 float ShapeFinder::scale_at(const Region& region) const {

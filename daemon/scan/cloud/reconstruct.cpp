@@ -100,7 +100,7 @@ struct CameraFrame {
 /// A point for each pixel of a camera, from the symbols of its frame.
 DenseView measure_pixels(const CameraFrame& frame, ScanSetup& setup, const ScanRequest& request, ScanResult& result) {
   const auto& [image, decoder, mapper, camera, light] = frame;
-  DecodedSymbols symbols = decoder.symbols();
+  DecodedSymbols symbols = decoder.symbols(*setup.crew);
   if (light.white) symbols.noise = measure_noise(image, light.full);  // the symbols may come from the quotient image
   if (DenseMap& map = mapper->map(); map.pixels.empty()) map = setup.dense->spare_map();
   DenseMap& map = request.of_stream ? mapper->measure_next(image, light.full, symbols, *setup.crew)

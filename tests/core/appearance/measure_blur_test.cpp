@@ -72,7 +72,8 @@ struct Patches {
           std::vector<CellTask> aligned = tasks;
           align_cells(light, full, field, {}, aligned);
           BlurMeter meter;
-          for (const CellTask& task : aligned) meter.add(light, full, field, {}, task);
+          for (const CellTask& task : aligned)
+            if (const auto blur = blur_of_patch(light, full, field, {}, task)) meter.add(*blur);
           return BlurSeen{.aligned = 1,
                           .tried = 1,
                           .blur_px = changed_blur_px(field.blur_sigma_px(), meter.change().value_or(0)),
@@ -88,7 +89,8 @@ struct Patches {
       std::vector<CellTask> aligned = tasks;
       align_cells(frame.view(), kBlurFull, field, {}, aligned);
       meter.clear();
-      for (const CellTask& task : aligned) meter.add(frame.view(), kBlurFull, field, {}, task);
+      for (const CellTask& task : aligned)
+        if (const auto blur = blur_of_patch(frame.view(), kBlurFull, field, {}, task)) meter.add(*blur);
       blur_px = changed_blur_px(blur_px, meter.change().value_or(0));
     }
     return blur_px;
@@ -123,14 +125,17 @@ TEST(BlurMeter, StraightToneStaysStraight) {
   for (const double blur_px : {0.45, 0.8, 1.5}) EXPECT_EQ(Patches(blur_px, 1500).find_tone(), 1) << blur_px;
 }
 
-TEST(BlurMeter, KnowsNothingOfWhatFailed) {
+TEST(BlurMeter, KnowsNothingWithoutAPatch) {
   BlurMeter meter;
   EXPECT_FALSE(meter.change().has_value());
   EXPECT_FALSE(meter.tone_change().has_value());
+}
+
+TEST(BlurMeter, LearnsNothingFromWhatFailed) {
   CellTask failed = Patches(0.8).tasks[0];
   failed.patch.failed = true;
-  meter.add(Grey16(1600, 1200).view(), kBlurFull, PatternField(shown_pattern().view(), 0.8F), {}, failed);
-  EXPECT_FALSE(meter.change().has_value());
+  EXPECT_FALSE(
+      blur_of_patch(Grey16(1600, 1200).view(), kBlurFull, PatternField(shown_pattern().view(), 0.8F), {}, failed));
 }
 
 /// A look at a frame of this blur: each patch asks for half of the way, and narrow fields align none if it is wide.

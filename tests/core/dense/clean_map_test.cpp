@@ -14,6 +14,8 @@
 namespace slsd {
 namespace {
 
+SerialExecutor cleans_alone;
+
 using Drawing = std::vector<std::string_view>;
 
 /// '#' a pixel at 1 m that is firm, 'o' one that is not, '2' one at 2 m, '.' none.
@@ -55,7 +57,7 @@ SurfaceSeed seed_at(float x, float y, float depth_mm = 1000) {
 TEST(DropSmallComponents, KeepsWhatIsLargeEnough) {
   DenseMap map = map_of({"##...#", "##...#", "......", "###..."});
   const std::vector<SurfaceSeed> seeds = {seed_at(0, 0), seed_at(5, 1), seed_at(2.3F, 2.8F)};
-  MapCleaner().drop_small_components(map, 3, seeds);
+  MapCleaner().drop_small_components(map, 3, seeds, cleans_alone);
   EXPECT_EQ(left_of(map), "##....\n##....\n......\n###...\n");
   EXPECT_EQ(map.pixels[5], DensePixel::kSmallComponent);
 }
@@ -63,7 +65,7 @@ TEST(DropSmallComponents, KeepsWhatIsLargeEnough) {
 TEST(DropSmallComponents, AJumpInDepthParts) {
   DenseMap map = map_of({"####22", "####22"});
   const std::vector<SurfaceSeed> seeds = {seed_at(1, 1), seed_at(5, 1, 2000)};
-  MapCleaner().drop_small_components(map, 5, seeds);
+  MapCleaner().drop_small_components(map, 5, seeds, cleans_alone);
   EXPECT_EQ(left_of(map), "####..\n####..\n");
 }
 
@@ -71,7 +73,7 @@ TEST(DropSmallComponents, WhatBearsNoSymbolHasToBeFarLarger) {
   const Drawing rows = {"###############..........", ".........................", "#########################"};
   const auto after = [&](const std::vector<SurfaceSeed>& seeds) {
     DenseMap map = map_of(rows);
-    MapCleaner().drop_small_components(map, 1, seeds);
+    MapCleaner().drop_small_components(map, 1, seeds, cleans_alone);
     return map.measured(0);
   };
   EXPECT_FALSE(after({}));
@@ -79,20 +81,20 @@ TEST(DropSmallComponents, WhatBearsNoSymbolHasToBeFarLarger) {
   EXPECT_FALSE(after({seed_at(7, 0, 2000)})) << "a symbol behind it";
   EXPECT_FALSE(after({seed_at(7, 1), seed_at(7, 2), seed_at(20, 0), seed_at(-3, 0), seed_at(9, 40)})) << "beside it";
   DenseMap map = map_of(rows);
-  MapCleaner().drop_small_components(map, 1, {});
+  MapCleaner().drop_small_components(map, 1, {}, cleans_alone);
   EXPECT_TRUE(map.measured(50)) << "25 pixels are enough by themselves";
 }
 
 TEST(Prune, TakesWhatIsNearerToAHoleThanAsked) {
   const Drawing rows = {"......", ".#####", ".#####", ".#####", ".#####"};
   DenseMap map = map_of(rows);
-  MapCleaner().prune(map, 0, 0);
+  MapCleaner().prune(map, 0, 0, cleans_alone);
   EXPECT_EQ(left_of(map), "......\n.#####\n.#####\n.#####\n.#####\n");
-  MapCleaner().prune(map, 1, 0);
+  MapCleaner().prune(map, 1, 0, cleans_alone);
   EXPECT_EQ(left_of(map), "......\n......\n..####\n..####\n..####\n");
   EXPECT_EQ(map.pixels[7], DensePixel::kAtAnEdge);
   map = map_of(rows);
-  MapCleaner().prune(map, 2, 0);
+  MapCleaner().prune(map, 2, 0, cleans_alone);
   EXPECT_EQ(left_of(map), "......\n......\n......\n...###\n...###\n");
 }
 
@@ -100,7 +102,7 @@ TEST(Prune, ASmallHoleWithinOneSurfaceIsNoEdge) {
   const Drawing rows = {"########", "#..##.##", "#.###..#", "########"};
   const auto after = [&](const Drawing& drawing, std::size_t most) {
     DenseMap map = map_of(drawing);
-    MapCleaner().prune(map, 1, most);
+    MapCleaner().prune(map, 1, most, cleans_alone);
     return left_of(map);
   };
   EXPECT_EQ(after(rows, 3), "########\n#..##.##\n#.###..#\n########\n");
@@ -114,13 +116,13 @@ TEST(Prune, ASmallHoleWithinOneSurfaceIsNoEdge) {
 
 TEST(Prune, TakesBothSidesOfAJump) {
   DenseMap map = map_of({"###222", "###222", "###222"});
-  MapCleaner().prune(map, 1, 0);
+  MapCleaner().prune(map, 1, 0, cleans_alone);
   EXPECT_EQ(left_of(map), "##..##\n##..##\n##..##\n");
 }
 
 TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
   DenseMap map = map_of({"##o##ooo", "##o##ooo", "##o##ooo", "##o##ooo"});
-  MapCleaner().drop_unlit_boundaries(map, 1);
+  MapCleaner().drop_unlit_boundaries(map, 1, cleans_alone);
   EXPECT_EQ(left_of(map), "#####...\n#####...\n#####...\n#####...\n");
   EXPECT_EQ(map.pixels[5], DensePixel::kUnlit);
 }
@@ -128,10 +130,10 @@ TEST(DropUnlitRims, KeepsWhatFirmPixelsEnclose) {
 TEST(DropUnlitRims, BridgesTwiceItsReachAcrossWords) {
   const std::string lit(60, '#'), row = lit + "oooooo" + lit, whole(126, '#');
   DenseMap map = map_of({row, row});
-  MapCleaner().drop_unlit_boundaries(map, 3);
+  MapCleaner().drop_unlit_boundaries(map, 3, cleans_alone);
   EXPECT_EQ(left_of(map), whole + "\n" + whole + "\n");
   map = map_of({row, row});
-  MapCleaner().drop_unlit_boundaries(map, 2);
+  MapCleaner().drop_unlit_boundaries(map, 2, cleans_alone);
   EXPECT_EQ(left_of(map).find('.'), 60U);
 }
 

@@ -92,7 +92,8 @@ class RecoveredPlane : public testing::Test {
   }
   [[nodiscard]] std::vector<std::int32_t> recover_all() {
     return look([&](const LetterScene& scene) -> std::vector<std::int32_t> {
-      return SymbolRecovery(pattern_, letters_).recover(scene);
+      SerialExecutor alone;
+      return SymbolRecovery(pattern_, letters_).recover(scene, alone);
     });
   }
   /// Distance of the recovered symbol from its true centre, camera px; empty if it is not recovered.

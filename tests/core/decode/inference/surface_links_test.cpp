@@ -45,7 +45,8 @@ struct Plane {
     aligned.assign(grid.nodes.size(), Aligned::kNot);
     find_beside(grid.nodes, beside);
     letters.look_at(shapes, aligned);
-    links.measure({grid.nodes, beside, moments, aligned, labels}, letters, CellGate(cells, {}, 1.5));
+    SerialExecutor alone;
+    links.measure({grid.nodes, beside, moments, aligned, labels}, letters, CellGate(cells, {}, 1.5), alone);
   }
   /// Moves all symbols from a column on, cells.
   void slide_from(int column, float by) {
