@@ -38,7 +38,7 @@ def few_rights(machine):
 
 
 def who_may_what(machine):
-    status, output = machine.scan(user="bob")
+    status, output = machine.scan(user="bob", output="/tmp/bob.ply")
     require(status == 3 or "group" in output, f"a stranger is told: {output}")
     require(status != 0, "a stranger scans")
     status, output = machine.run("slsctl", "project", "white", user="alice", check=False)

@@ -82,6 +82,7 @@ class Machine:
         self.run("systemctl", "restart", "slsd")
 
     def scan(self, *options, user="alice", output="/tmp/cloud.ply"):
+        """@param output  another user's file is refused before the service is asked"""
         return self.run("slsctl", "scan", "-o", output, *options, user=user, check=False)
 
 
