@@ -26,8 +26,8 @@ bool is_along_row(Direction d) {
 
 }  // namespace
 
-CellInference::CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
-                             Rules rules)
+CellInference::CellInference(const Pattern& pattern, const std::shared_ptr<const Codebook>& codebook,
+                             double wrong_cells_max, Rules rules)
     : rules_(rules),
       grid_{codebook->rows(), codebook->columns()},
       proposer_(pattern.array, codebook),

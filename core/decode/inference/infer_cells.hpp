@@ -33,7 +33,7 @@ class CellInference {
  public:
   /// @param codebook         codebook of the visible part of the pattern's array
   /// @param wrong_cells_max  wrong cells that a frame may have: sets the required margin
-  CellInference(const Pattern& pattern, std::shared_ptr<const Codebook> codebook, double wrong_cells_max,
+  CellInference(const Pattern& pattern, const std::shared_ptr<const Codebook>& codebook, double wrong_cells_max,
                 Rules rules = {});
 
   /// Proposes cells for the nodes, without deciding on any.
