@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <memory>
 #include <system_error>
 
@@ -41,12 +42,16 @@ void drop_capabilities() {
   ::syscall(SYS_capset, &header, none);
 }
 
+/// Kills the only thread, and so the process. libseccomp asks the kernel for SCMP_ACT_KILL_PROCESS by seccomp(2), which
+/// systemd's @system-service forbids the service up to version 252.
+constexpr std::uint32_t kKill = SCMP_ACT_KILL_THREAD;
+
 /// Forbids this process all other system calls, and memory that is executable or of a file.
 /// @return  0, or a negative error number
 int filter_system_calls() {
-  const std::unique_ptr<void, decltype(&seccomp_release)> filter(seccomp_init(SCMP_ACT_KILL_PROCESS), seccomp_release);
+  const std::unique_ptr<void, decltype(&seccomp_release)> filter(seccomp_init(kKill), seccomp_release);
   if (filter == nullptr) return -EINVAL;
-  int error = seccomp_attr_set(filter.get(), SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
+  int error = seccomp_attr_set(filter.get(), SCMP_FLTATR_ACT_BADARCH, kKill);
   for (const int call : kAllowed)
     if (error == 0) error = seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 0);
   if (error == 0)
