@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "core/printable.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/configuration/settings_over.hpp"
 #include "programs/calibrate/board_request.hpp"
@@ -35,6 +36,23 @@ std::vector<std::string> camera_names(const std::vector<CapturedPose>& poses, co
   folders.erase("");
   names.insert(names.end(), folders.begin(), folders.end());
   return names;
+}
+
+/// Several cameras must all have pictures: slsd starts only with a calibration of them all.
+Result<> check_cameras(const CalibrateRequest& request, const std::vector<std::string>& names,
+                       const Configuration& configuration) {
+  if (!request.output.empty() || configuration.cameras.size() < 2) return {};
+  for (const CameraOptions& camera : configuration.cameras) {
+    if (std::ranges::find(names, camera.name()) != names.end()) continue;
+    return fail(
+        ErrorCode::kMismatch,
+        fmt::format("has no pictures of camera \"{}\", which is configured, and slsd does not start without it in "
+                    "the calibration: take poses with all cameras, leave its [[camera]] table out, or keep the "
+                    "calibration elsewhere with --output",
+                    printable(camera.name(), 64)),
+        request.from.string());
+  }
+  return {};
 }
 
 ImageSize projector_of(const Pattern& pattern, const Configuration& configuration, bool gray_code) {
@@ -89,6 +107,8 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
   if (!request.use.empty()) {
     if (auto kept = keep_part(request.use, *poses); !kept) return kept;
   }
+  const std::vector<std::string> names = camera_names(*poses, *configuration);
+  if (auto all = check_cameras(request, names, *configuration); !all) return all;
   const auto pattern = captured_pattern(request.from, *configuration);
   if (!pattern) return tl::unexpected(pattern.error());
 
@@ -98,7 +118,7 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
                            *plane ? ", reference plane " + to_string(**plane) : "", projector.width_px,
                            projector.height_px, poses->size());
   PoseObservers observers = make_observers(*board, *plane, *pattern, projector, gray_code);
-  auto captures = read_captures(*poses, camera_names(*poses, *configuration), projector, gray_code, observers,
+  auto captures = read_captures(*poses, names, projector, gray_code, observers,
                                 [](const std::string& line) { std::cout << line << std::endl; });
   if (!captures) return tl::unexpected(captures.error());
   if (captures->observations.count(PoseSubject::kBoard) == 0) {

@@ -4,6 +4,7 @@
 """A calibration over the socket, by doubles of a camera and a projector that see somebody hold a board."""
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import tempfile
@@ -86,6 +87,20 @@ class Calibrate(unittest.TestCase):
                 self.assertEqual(client.call("settings")[0]["set"], {"calibration": {"file": str(kept)}})
                 self.assertGreater(client.call("scan", timeout_ms=20000)[0]["points"], 500)
             self.assertEqual(service.stop()[0], 0)
+
+    def test_a_camera_for_colour_alone_is_calibrated_with_the_others(self):
+        configuration = '[[camera]]\nname = "colour"\ndriver = "file"\npath = "stage"\nuse = "texture"\n' + CONFIGURATION
+        with stage(self.state, configuration) as service, service.client() as client:
+            done = slsctl("--socket", service.socket, "calibrate", "--poses", 4, "--board", BOARD)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            # It stands first in the file, and last in the calibration: the other gives the frame.
+            self.assertRegex(done.stdout, r"(?m)^camera left +camera colour +projector$")
+            kept = (self.state / "calibration-slsd.yml").read_text(encoding="utf-8")
+            self.assertEqual(re.findall(r'name: "(.*)"', kept), ["left", "colour"])
+            status = client.call("status")[0]
+            self.assertEqual(status["calibration"], str(self.state / "calibration-slsd.yml"))
+            self.assertEqual([camera.get("use") for camera in client.call("settings")[0]["cameras"]], [None, "texture"])
+            self.assertGreater(client.call("scan", timeout_ms=20000)[0]["points"], 500)
 
     def test_by_slsctl(self):
         with stage(self.state) as service:

@@ -122,8 +122,15 @@ class CaptureReader {
     sizes_[{pose.name, camera}] = size_of(pictures->white);
     auto view = observers_.of(pose.subject).observe(camera, pictures->views());
     if (!gray_code_) looks_.push_back({pose.name, camera, pose.subject, &files});
-    if (!gray_code_ && !(view && view->shift_px)) doubts_.push_back(looks_.back());
+    if (!gray_code_ && !shows_own_print(pose.subject, view, *pictures)) doubts_.push_back(looks_.back());
     return view;
+  }
+
+  /// Also a camera that reads nothing of the pattern may show that the picture belongs to the pose.
+  [[nodiscard]] bool shows_own_print(PoseSubject subject, const Result<PoseView>& seen,
+                                     const CapturedPictures& pictures) {
+    if (seen) return seen->shift_px.has_value();
+    return observers_.of(subject).print_shift(view(pictures.white), view(pictures.coded.front())).certain();
   }
 
   void refuse(const PoseObservation& pose, PoseFault fault, const std::string& reason) {
