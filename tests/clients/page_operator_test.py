@@ -169,6 +169,9 @@ class Operator(unittest.TestCase):
             browser.wait("[...document.getElementById('preset').options].some((o) => o.value === 'gone')", "no preset")
             self.choose(browser, "preset", "gone")
             client.call("preset", action="delete", name="gone")
+            browser.run("return readPresets();")
+            self.assertEqual(browser.run("return document.getElementById('preset').value;"), "gone")  # it was chosen
+            self.assertIn("was deleted", self.text(browser, "preset-about"))
             before = client.call("status")[0]["scans"]["succeeded"]
             browser.click("#scan")
             browser.wait("/gone/.test(document.getElementById('message').textContent)", "no message")
@@ -238,6 +241,10 @@ class Operator(unittest.TestCase):
             self.assertTrue(browser.run("return document.getElementById('measure').checked;"))
             self.full_screen(browser, "f", "cloud", "#space")
             self.full_screen(browser, "g", "camera", "#picture")
+            browser.run("for (const key of 'ffffg') document.dispatchEvent(new KeyboardEvent('keydown', {key}));")
+            browser.run("return screenChanges;")
+            self.assertEqual(browser.run("return document.body.dataset.full;"), "camera")
+            browser.run("toggleFull('camera'); return screenChanges;")
             browser.resize(390, 844)
             for key, view in (("1", "devices"), ("4", "model"), ("5", "calibrate"), ("3", "cloud")):
                 browser.key(key)

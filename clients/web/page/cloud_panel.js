@@ -156,7 +156,11 @@ function leaveCursor() {
 async function scan() {
   const preset = presetOfScan();
   const density = $("density").value, colour = $("colour").value === "own" ? {colour: true} : {};
-  const {buffer, about} = await askWithProgress("api/scan", {density, ...preset, ...partOfScan(), ...colour}, density);
+  const {buffer, about} = await askWithProgress("api/scan", {density, ...preset, ...partOfScan(), ...colour}, density)
+    .catch(async (error) => {
+      if (preset.preset) await presetWasRefused().catch(() => {});  // the scan's own error says more
+      throw error;
+    });
   boxWasScanned();
   showCloud(buffer, about);
   if (preset.preset) await presetWasScanned();

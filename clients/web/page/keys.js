@@ -42,6 +42,7 @@ function toggleHelp() {
 
 // The whole page goes to full screen and shows one view, so that messages stay visible. Where the browser refuses full
 // screen, the view takes the window.
+const kScreenPause = 1000;
 let screenChanges = Promise.resolve(), leavesScreen = false;
 
 function toggleFull(view) {
@@ -53,7 +54,10 @@ async function followFull() {
   const wanted = Boolean(document.body.dataset.full), root = document.documentElement;
   if (wanted === Boolean(document.fullscreenElement) || !root.requestFullscreen) return;
   leavesScreen = !wanted;
+  // The event comes after the promise. Without it, the next change would take it for the browser's own key.
+  const changed = new Promise((done) => document.addEventListener("fullscreenchange", done, {once: true}));
   await (wanted ? root.requestFullscreen() : document.exitFullscreen());
+  await Promise.race([changed, pause(kScreenPause)]);
 }
 
 function showFull(view) {

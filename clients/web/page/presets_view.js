@@ -18,16 +18,21 @@ function settingsInWords(settings) {
   return words.length === 0 ? "everything as in the configuration's file" : words.join(", ");
 }
 
+// A chosen preset stays, also if another client deleted it: the scan is then refused, instead of measuring by other settings.
 function showPresets() {
-  const names = Object.keys(presets).sort(), choice = $("preset");
-  if (presetChosen !== null && !presets[presetChosen]) presetChosen = null;
+  const names = [...new Set([...Object.keys(presets), ...(presetChosen === null ? [] : [presetChosen])])].sort(), choice = $("preset");
   if ([...choice.options].slice(1).map((option) => option.value).join("\n") !== names.join("\n"))
     choice.replaceChildren(choice.options[0], ...names.map((name) => Object.assign(element("option", name), {value: name})));
   const shown = presetChosen ?? presetInForce ?? "";
   if (choice.value !== shown) choice.value = shown;
   allow($("preset-delete"), shown !== "" && mayAdminister);
   allow($("preset-save"), mayAdminister);
-  $("preset-about").textContent = !shown ? "" : `${shown}: ${settingsInWords(presets[shown].settings)}.` +
+  $("preset-about").textContent = shown && presetInWords(shown);
+}
+
+function presetInWords(name) {
+  if (!presets[name]) return `${name} was deleted: choose another preset.`;
+  return `${name}: ${settingsInWords(presets[name].settings)}.` +
     (presetChosen !== null && presetChosen !== presetInForce ? " It comes into force with the next scan." : "");
 }
 
@@ -40,7 +45,7 @@ async function readPresets() {
 function choosePreset() {
   presetChosen = $("preset").value || null;
   forgetBox();  // a preset has its own
-  const {density} = (presetChosen && presets[presetChosen].settings.decode) || {};
+  const {density} = (presets[presetChosen] && presets[presetChosen].settings.decode) || {};
   if (density) {  // else the page would ask for another one
     $("density").value = density;
     $("density").dispatchEvent(new Event("change"));
@@ -54,6 +59,13 @@ const presetOfScan = () => presetChosen === null ? {} : {preset: presetChosen};
 async function presetWasScanned() {
   presetChosen = null;
   await readPresets();
+}
+
+async function presetWasRefused() {
+  await readPresets();
+  if (presetChosen === null || presets[presetChosen]) return;
+  presetChosen = null;
+  showPresets();
 }
 
 async function followPresets() {
