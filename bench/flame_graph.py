@@ -10,7 +10,7 @@ import sys
 import zlib
 
 WIDTH, ROW, MARGIN, LEAST_SHARE = 1200, 18, 10, 0.001
-CLONED = re.compile(r"^slsd::Cloned<&\(?(?:void )?(?:slsd::)?(?:\(anonymous namespace\)::)?(\w+).*>::(plain|avx2_fma|avx2)\b")
+CLONED = re.compile(r"^slsd::Cloned<&\(?(?:void )?(?:slsd::)?(?:\(anonymous namespace\)::)?(\w+).*>::(plain|avx512|avx2_fma|avx2)\b")
 
 
 def short(name):

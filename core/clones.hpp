@@ -15,6 +15,7 @@ enum class Clone : std::uint8_t {
   kPlain,    ///< the architecture's minimum: SSE2, NEON
   kAvx2,     ///< the same results as kPlain
   kAvx2Fma,  ///< the same except for rounding, as products are not rounded before the addition
+  kAvx512,   ///< as kAvx2Fma, with twice the registers
 };
 
 /// Lists the clones that this machine can run, the plain one first and the fastest last.
@@ -34,6 +35,8 @@ struct Cloned<kBody> {
   static Result call(Parameters... parameters) {
 #if defined(__x86_64__)
     switch (clone_in_use.load(std::memory_order_relaxed)) {
+      case Clone::kAvx512:
+        return avx512(parameters...);
       case Clone::kAvx2Fma:
         return avx2_fma(parameters...);
       case Clone::kAvx2:
@@ -54,6 +57,10 @@ struct Cloned<kBody> {
     return kBody(parameters...);
   }
   __attribute__((noinline, target("avx2,bmi,bmi2,popcnt,fma"))) static Result avx2_fma(Parameters... parameters) {
+    return kBody(parameters...);
+  }
+  __attribute__((noinline, target("avx512f,avx512vl,avx512bw,avx512dq,avx2,bmi,bmi2,popcnt,fma"))) static Result avx512(
+      Parameters... parameters) {
     return kBody(parameters...);
   }
 #endif
