@@ -9,7 +9,7 @@
 #include "core/appearance/patch_map.hpp"
 #include "core/appearance/pattern_field.hpp"
 #include "core/decode/grid/lattice_frame.hpp"
-#include "core/dense/ray_grid.hpp"
+#include "core/dense/nodes/ray_grid.hpp"
 #include "core/geometry/ray_table.hpp"
 
 namespace slsd {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "core/dense/part_of_cloud.hpp"
+#include "core/dense/cloud/part_of_cloud.hpp"
 #include "core/result.hpp"
 #include "daemon/configuration/frame_options.hpp"
 

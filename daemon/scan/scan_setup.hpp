@@ -14,7 +14,7 @@
 #include "core/calibration_file/hand_eye_file.hpp"
 #include "core/code/pattern.hpp"
 #include "core/decode/decoder.hpp"
-#include "core/dense/dense_cloud.hpp"
+#include "core/dense/cloud/dense_cloud.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/image.hpp"

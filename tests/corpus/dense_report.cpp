@@ -13,7 +13,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "core/calibration_file/calibration_file.hpp"
-#include "core/dense/dense_cloud.hpp"
+#include "core/dense/cloud/dense_cloud.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "drivers/files/encode_png.hpp"

@@ -12,7 +12,7 @@
 #include "core/cloud/byte_sink.hpp"
 #include "core/cloud/cloud.hpp"
 #include "core/decode/options.hpp"
-#include "core/dense/dense_cloud.hpp"
+#include "core/dense/cloud/dense_cloud.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
 #include "daemon/scan/cloud/sealed_memory.hpp"

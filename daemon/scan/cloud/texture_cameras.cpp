@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/dense/paint_view.hpp"
+#include "core/dense/cloud/paint_view.hpp"
 
 namespace slsd {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "core/cloud/texture_view.hpp"
-#include "core/dense/dense_cloud.hpp"
+#include "core/dense/cloud/dense_cloud.hpp"
 #include "core/executor.hpp"
 #include "core/result.hpp"
 #include "daemon/scan/cloud/scan_result.hpp"
