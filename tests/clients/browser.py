@@ -17,7 +17,7 @@ import urllib.request
 TIMEOUT_S = 600
 ARGUMENTS = ["--headless=new", "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
              "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage", "--hide-scrollbars",
-             "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+             "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-rasterization"]
 
 
 def is_there():

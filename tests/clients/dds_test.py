@@ -187,7 +187,7 @@ class Thinned(unittest.TestCase):
         self.assertTrue(every.issuperset(map(tuple, np.stack([points[axis] for axis in "xyz"], axis=1).tolist())))
 
     def test_to_what_may_leave_says_so_and_counts_the_rest(self):
-        with Service() as service, Bridge(service, "--density", "pixels", "--rate-max", "1") as bridge, \
+        with Service() as service, Bridge(service, "--density", "pixels", "--stride", "4", "--rate-max", "1") as bridge, \
                 States() as states, Listener("left/points", "PointCloud2") as clouds:
             clouds.next()
             clouds.next()
