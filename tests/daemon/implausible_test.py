@@ -27,6 +27,10 @@ def metres(text):
     return put(text, "T", [value / 1000 for value in numbers(text, "T")[1]])
 
 
+def micrometres(text):
+    return put(text, "T", [value * 1000 for value in numbers(text, "T")[1]])
+
+
 def inverted(text):
     turn, shift = numbers(text, "R")[1], numbers(text, "T")[1]
     back = [turn[3 * column + row] for row in range(3) for column in range(3)]
@@ -57,6 +61,13 @@ class Implausible(unittest.TestCase):
             with self.subTest(change.__name__):
                 self.assertRegex(self.check(change), f"(?m)^warning .*{ADVICE[change.__name__]}")
         self.assertIn(ADVICE["metres"], self.check(metres, "--check-config"))
+
+    def test_lengths_of_another_unit_take_no_longer(self):
+        """Symbols of thousands of pixels follow from them, whose looks would take minutes to draw."""
+        self.assertIn("T looks like micrometres", self.check(micrometres, "--check-config"))
+        file = self.folder / "slsd.toml"
+        file.write_text(configuration(self.folder) + "[decode]\ndepth_min_mm = 0.4\ndepth_max_mm = 2.5\n", encoding="utf-8")
+        self.assertRegex(slsd("--check-config", "--config", file).stdout, r"(?m)^warning .*look like metres: multiply them by 1000")
 
     def test_check_is_content_with_a_sound_one(self):
         told = self.check(None)

@@ -138,6 +138,16 @@ std::string detour_doubt(const CalibratedCamera& first, const CalibratedCamera& 
                      advice);
 }
 
+// No projector and camera measure so near.
+std::string range_doubt(const DepthRange& range) {
+  constexpr double kNearestMm = 20;
+  if (range.max_mm > kNearestMm) return {};
+  return fmt::format(
+      "the working range is implausible: depth_min_mm ({:g}) and depth_max_mm ({:g}) are millimetres, and look like "
+      "metres: multiply them by 1000",
+      range.min_mm, range.max_mm);
+}
+
 std::string about(const CalibratedCamera& camera, const std::string& doubt) {
   return "the calibration of camera \"" + camera.name + "\" is implausible: " + doubt;
 }
@@ -189,6 +199,7 @@ std::vector<Ranked> explaining(const std::vector<Misreading>& misreadings, std::
 }  // namespace
 
 std::vector<std::string> calibration_doubts(const Calibration& calibration, const DepthRange& range) {
+  if (std::string doubt = range_doubt(range); !doubt.empty()) return {std::move(doubt)};
   std::vector<std::string> doubts;
   for (const CalibratedCamera& camera : calibration.cameras) {
     std::string doubt = rig_doubt({camera, calibration.projector}, range);

@@ -103,6 +103,21 @@ void add_swapped(const CameraRig& rig, std::vector<Misreading>& found) {
   found.push_back(std::move(swapped));
 }
 
+// Metashape and MATLAB list the radial coefficients first.
+void add_distortions(const CameraRig& rig, std::vector<Misreading>& found) {
+  constexpr double kShare = 0.01;
+  const auto add = [&](const char* key, auto lens_of) {
+    Misreading ordered{fmt::format("{} looks ordered as k1 k2 k3 p1 p2: slsd reads k1 k2 p1 p2 k3", key),
+                       std::log(kShare), rig};
+    auto& [k1, k2, p1, p2, k3] = lens_of(ordered.rig).distortion;
+    const double third = p1;
+    p1 = p2, p2 = k3, k3 = third;
+    found.push_back(std::move(ordered));
+  };
+  add("camera_distortion", [](CameraRig& of) -> Lens& { return of.camera.lens; });
+  add("projector_distortion", [](CameraRig& of) -> Lens& { return of.projector; });
+}
+
 }  // namespace
 
 std::vector<Misreading> misreadings_of(const CameraRig& rig) {
@@ -110,6 +125,7 @@ std::vector<Misreading> misreadings_of(const CameraRig& rig) {
   add_motions(rig, found);
   add_sizes(rig, found);
   add_swapped(rig, found);
+  add_distortions(rig, found);
   return found;
 }
 

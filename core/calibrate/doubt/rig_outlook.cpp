@@ -82,6 +82,12 @@ double log_focal_length(double share_of_width) {
   return log_normal(share_of_width, 1.4, 0.8);
 }
 
+double log_decentring(const Lens& lens) {
+  constexpr double kDeviation = 0.004, kPoorlyMeasured = 1e-3;
+  const double off = square(lens.distortion[2] / kDeviation) + square(lens.distortion[3] / kDeviation);
+  return std::log(std::exp(-0.5 * off) + kPoorlyMeasured);
+}
+
 }  // namespace
 
 double DepthRange::middle_mm() const {
@@ -122,7 +128,8 @@ LensLikelihood camera_likelihood(const Lens& lens) {
   const double x = lens.cx / lens.width_px, y = lens.cy / lens.height_px;
   const double off = square((x - 0.5) / kAcrossDeviation) + square((y - 0.5) / kDownDeviation);
   const bool inside = is_inside(lens, {lens.cx, lens.cy});
-  return {std::log(std::exp(-0.5 * off) + (inside ? kCropped : 0) + kNever), log_focal_length(lens.fx / lens.width_px)};
+  return {std::log(std::exp(-0.5 * off) + (inside ? kCropped : 0) + kNever), log_focal_length(lens.fx / lens.width_px),
+          log_decentring(lens)};
 }
 
 LensLikelihood projector_likelihood(const Lens& lens) {
@@ -131,7 +138,7 @@ LensLikelihood projector_likelihood(const Lens& lens) {
   const double x = lens.cx / lens.width_px, y = lens.cy / lens.height_px;
   const bool inside = x >= 0 && x <= 1, shifted = y >= -kShiftedMost && y <= 1 + kShiftedMost;
   const double across = std::exp(-0.5 * square((x - 0.5) / kAcrossDeviation)) + (inside ? kShiftedAcross : 0);
-  return {std::log((shifted ? across : 0) + kNever), log_focal_length(lens.fx / lens.width_px)};
+  return {std::log((shifted ? across : 0) + kNever), log_focal_length(lens.fx / lens.width_px), log_decentring(lens)};
 }
 
 }  // namespace slsd

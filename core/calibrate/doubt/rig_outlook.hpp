@@ -33,8 +33,9 @@ struct RigOutlook {
 struct LensLikelihood {
   double principal_point;
   double focal_length;
+  double decentring;  ///< of the tangential distortion, which is small in every lens
 
-  [[nodiscard]] double sum() const { return principal_point + focal_length; }
+  [[nodiscard]] double sum() const { return principal_point + focal_length + decentring; }
 };
 [[nodiscard]] LensLikelihood camera_likelihood(const Lens& lens);
 /// A projector's lens may shift the image up or down.

@@ -21,6 +21,15 @@ constexpr float kExpectedDistanceMax = 25;
 constexpr float kMeasuredDistanceMax = 20;
 constexpr std::optional<float> kAnyBlur[] = {std::nullopt};
 
+/// Larger symbols look like those of this side, in camera px. Drawing them takes time in squares of the side, and a
+/// calibration in micrometres predicts thousands of px.
+constexpr float kDrawnSidePxMax = 96;
+
+float drawn_scale(const PatternOptions& pattern, float camera_px_per_projector_px) {
+  const float most = kDrawnSidePxMax / static_cast<float>(pattern.symbol_size_px);
+  return camera_px_per_projector_px < most ? camera_px_per_projector_px : most;  // not finite: from a singular frame
+}
+
 /// One for each of the blurs.
 std::vector<Appearance> make_appearances(const PatternOptions& pattern, float scale,
                                          std::span<const std::optional<float>> blurs_px) {
@@ -46,15 +55,16 @@ Appearance::Appearance(std::optional<float> blur, PrototypeSets&& made)
 
 Appearances::Appearances(const PatternOptions& pattern, float camera_px_per_projector_px)
     : pattern_(pattern),
-      scale_(camera_px_per_projector_px),
-      usual_(std::move(make_appearances(pattern, camera_px_per_projector_px, kAnyBlur).front())) {}
+      scale_(drawn_scale(pattern, camera_px_per_projector_px)),
+      usual_(std::move(make_appearances(pattern, scale_, kAnyBlur).front())) {}
 
 std::shared_ptr<const Appearances> Appearances::shared(const PatternOptions& pattern, float camera_px_per_projector_px,
                                                        std::shared_ptr<const Appearances> known) {
   const auto symbols_of = [](const PatternOptions& of) {
     return std::tie(of.symbols, of.symbol_size_px, of.spacing_px);
   };
-  if (known && known->scale_ == camera_px_per_projector_px && symbols_of(known->pattern_) == symbols_of(pattern))
+  if (known && known->scale_ == drawn_scale(pattern, camera_px_per_projector_px) &&
+      symbols_of(known->pattern_) == symbols_of(pattern))
     return known;
   return std::make_shared<const Appearances>(pattern, camera_px_per_projector_px);
 }

@@ -2,6 +2,8 @@
 // Copyright the slsd authors
 #include "core/calibrate/doubt/calibration_doubts.hpp"
 
+#include <array>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -15,6 +17,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 constexpr DepthRange kRange{400, 2500};
 
@@ -83,6 +86,11 @@ void shrink(Lens& lens, double factor) {
   lens.fx *= factor, lens.fy *= factor, lens.cx *= factor, lens.cy *= factor;
 }
 
+// As Metashape and MATLAB write it.
+std::array<double, 5> radial_first(double k1, double k2, double k3, double p1, double p2) {
+  return {k1, k2, k3, p1, p2};
+}
+
 const Mistake kMistakes[] = {
     {"Metres", "T looks like metres: multiply it by 1000", [](Calibration& rig) { motion(rig).translation /= 1000; }},
     {"Centimetres", "T looks like centimetres: multiply it by 10",
@@ -104,6 +112,10 @@ const Mistake kMistakes[] = {
        std::swap(rig.cameras[0].lens.width_px, rig.projector.width_px);
        std::swap(rig.cameras[0].lens.height_px, rig.projector.height_px);
      }},
+    {"CameraWithRadialFirst", "camera_distortion looks ordered as k1 k2 k3 p1 p2: slsd reads k1 k2 p1 p2 k3",
+     [](Calibration& rig) { rig.cameras[0].lens.distortion = radial_first(-0.11, 0.13, -0.05, 0.0006, -0.0004); }},
+    {"ProjectorWithRadialFirst", "projector_distortion looks ordered as k1 k2 k3 p1 p2",
+     [](Calibration& rig) { rig.projector.distortion = radial_first(-0.06, 0.09, 0.03, -0.002, 0.001); }},
     {"PrincipalPointOutside", "camera_matrix has its principal point at (-300, 605) of 1600x1200 px",
      [](Calibration& rig) { rig.cameras[0].lens.cx = -300; }},
     {"FocalLengthInMillimetres", "a focal length of 8 px for 1600 px, a view of 179 degrees",
@@ -112,6 +124,19 @@ const Mistake kMistakes[] = {
 
 INSTANTIATE_TEST_SUITE_P(CalibrationDoubts, Mistaken, ::testing::ValuesIn(kMistakes),
                          [](const auto& one) { return one.param.name; });
+
+TEST(CalibrationDoubts, NamesAWorkingRangeInMetres) {
+  EXPECT_THAT(only_doubt(paper_rig(), {0.4, 2.5}),
+              HasSubstr("depth_max_mm (2.5) are millimetres, and look like metres"));
+  EXPECT_THAT(calibration_doubts(paper_rig(), {0.4, 2500}), ::testing::Each(Not(HasSubstr("working range is"))));
+}
+
+// A lens whose decentring was measured poorly is no mistake.
+TEST(CalibrationDoubts, HasNoneAboutALittleDecentring) {
+  Calibration rig = paper_rig();
+  rig.cameras[0].lens.distortion = {-0.11, 0.13, 0.008, -0.006, 0};
+  EXPECT_THAT(calibration_doubts(rig, kRange), IsEmpty());
+}
 
 TEST(CalibrationDoubts, SaysWhatTheRigCouldMeasure) {
   Calibration rig = rig_of(180, {1, 0, 0}, 1200);

@@ -3,6 +3,7 @@
 #include "core/decode/symbols/appearance.hpp"
 
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -83,6 +84,14 @@ TEST(Appearances, AreSharedForTheSameSymbolsAtTheSameScale) {
   EXPECT_NE(Appearances::shared(of_others, kCameraScale, known), known);
   EXPECT_NE(Appearances::shared(options(), 1.1F * kCameraScale, known), known);
   EXPECT_NE(Appearances::shared(options(), kCameraScale, nullptr), nullptr);
+}
+
+// A calibration in micrometres predicts symbols of thousands of pixels: drawing those would take minutes.
+TEST(Appearances, OfHugeSymbolsAreThoseOfTheLargestDrawn) {
+  const auto made = std::make_shared<const Appearances>(options(), 1e6F);
+  for (const float scale : {6.F, 6.1F, 1e4F, std::numeric_limits<float>::infinity(), std::nanf("")}) {
+    EXPECT_EQ(Appearances::shared(options(), scale, made), made) << scale;
+  }
 }
 
 TEST(Appearances, AreMadeOnce) {
