@@ -96,7 +96,8 @@ Result<LiveClouds> LiveClouds::open(const path& socket, const std::optional<path
 }
 
 Result<> LiveClouds::request() {
-  json params{{"format", "ply"}, {"density", "pixels"}, {"coordinate_frame", "rig"}};
+  // A configured stride or voxel_mm would take the neighbours from which surfaces are made.
+  json params{{"format", "ply"}, {"density", "pixels"}, {"coordinate_frame", "rig"}, {"stride", 1}, {"voxel_mm", 0}};
   if (colour_) params["colour"] = true;
   return connection_.request("scan", std::move(params));
 }

@@ -64,6 +64,8 @@ std::string wrong_mesh(const ClientOptions& options) {
   if (!mesh_format(cloud_format(options))) return "a mesh is written as .ply, .stl, .obj or .glb";
   if (options.density == "symbols") return "a mesh needs --density pixels: symbols are too far apart to tell edges";
   if (options.normals) return "a mesh has the normals of its triangles: leave out --normals";
+  if (options.stride.value_or(1) > 1 || options.voxel_mm.value_or(0) > 0)
+    return "a mesh joins adjacent pixels: leave out --stride and --voxel-mm";
   return {};
 }
 

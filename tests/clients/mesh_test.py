@@ -144,9 +144,19 @@ class Mesh(unittest.TestCase):
                 file.unlink()
                 self.assertEqual(list(self.folder.iterdir()), [])
 
+    def test_a_mesh_has_every_pixel_whatever_the_service_thins(self):
+        whole = len(mesh_ply(self.scan("whole.ply", "--mesh").read_bytes())[1])
+        self.assertEqual(slsctl("--socket", self.service.socket, "set", "cloud.stride=3", "cloud.voxel_mm=2").returncode, 0)
+        self.addCleanup(slsctl, "--socket", self.service.socket, "set", "cloud.stride=default", "cloud.voxel_mm=default")
+        self.assertEqual(len(mesh_ply(self.scan("thinned.ply", "--mesh").read_bytes())[1]), whole)
+        self.scan("whole.ply", "--mesh", "--stride", "1", "--voxel-mm", "0")
+
     def test_what_has_no_mesh_is_refused(self):
         cases = {("a.stl", "--density", "symbols"): "a mesh needs --density pixels",
-                 ("a.glb", "--normals"): "leave out --normals", ("a.pcd", "--mesh"): ".ply, .stl, .obj or .glb",
+                 ("a.glb", "--normals"): "leave out --normals",
+                 ("a.obj", "--stride", "2"): "leave out --stride and --voxel-mm",
+                 ("a.ply", "--mesh", "--voxel-mm", "1"): "leave out --stride and --voxel-mm",
+                 ("a.pcd", "--mesh"): ".ply, .stl, .obj or .glb",
                  ("a.tiff", "--mesh"): ".ply, .stl, .obj or .glb", ("--mesh",): "--mesh needs a file",
                  ("a.stl", "--format", "obj"): "does not match"}
         for arguments, expected in cases.items():

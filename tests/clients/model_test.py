@@ -341,6 +341,11 @@ class Model(unittest.TestCase):
                     shutil.rmtree(recording)
             report = json.loads(made.stdout)
             self.assertEqual((len(report["fused"]), report["refused"]), (2, []))
+            shutil.rmtree(recording)
+            slsctl("--socket", service.socket, "record", recording, "--frames", "1", "--clouds", "--density", "pixels", "--stride", "3")
+            made = subprocess.run([PROGRAM, "--from", recording, "-o", pathlib.Path(folder) / "bust.ply"], capture_output=True, text=True,
+                                  check=False)
+            self.assertIn("stride or voxel_mm thinned the cloud", made.stderr)
 
     def test_a_cut_recording_is_used_as_far_as_it_goes(self):
         cut = record(self.folder / "cut", self.clouds[:4], scans=0)
@@ -356,7 +361,7 @@ class Model(unittest.TestCase):
             if request["method"] == "settings":
                 return result(request, calibration=calibration())
             asks = {key: value for key, value in request["params"].items() if key not in also}
-            self.assertEqual(asks, {"format": "ply", "density": "pixels", "coordinate_frame": "rig", **more})
+            self.assertEqual(asks, {"format": "ply", "density": "pixels", "coordinate_frame": "rig", "stride": 1, "voxel_mm": 0, **more})
             number = len(asked)
             asked.append(request)
             if number in dict(errors):

@@ -140,7 +140,10 @@ Tracked Tracker::follow(const Shot& shot) {
 Tracked Tracker::add(std::size_t number, Shot shot) {
   if (shot.cells() < kFewestCells) {
     lost_ = !frames_.empty();
-    return {{}, "it shows almost nothing: the object left the view, or the scan failed", false};
+    return {
+        {},
+        "it shows almost nothing: the object left the view, the scan failed, or stride or voxel_mm thinned the cloud",
+        false};
   }
   candidate_.reset();
   Tracked tracked = frames_.empty() ? begin(shot) : follow(shot);

@@ -130,6 +130,7 @@ json scan_parameters(const ClientOptions& options, const std::string& density) {
   if (!density.empty()) params["density"] = density;
   if (!options.camera.empty()) params["camera"] = options.camera;
   params.update(asked_part(options));
+  if (is_mesh(options)) params["stride"] = 1, params["voxel_mm"] = 0;  // a configured one would tear the surface
   if (!options.preset.empty()) params["preset"] = options.preset;
   if (!options.coordinate_frame.empty()) params["coordinate_frame"] = options.coordinate_frame;
   if (!options.robot_pose.empty()) params["robot_pose"] = options.robot_pose, params["poses"] = options.pose_notation;
