@@ -180,6 +180,11 @@ class Thinned(unittest.TestCase):
         for axis in "xyz":
             np.testing.assert_array_equal(points[axis], whole[axis][np.sort(first)] / np.float32(1000))
 
+    def test_by_tiny_voxels_has_all_points(self):
+        for voxel in ("0.0001", "1e-30"):
+            points, whole = self.shown("symbols", "--voxel", voxel)
+            self.assertEqual(len(points), len(whole))
+
     def test_by_stride_has_every_third_pixel_of_every_third_row(self):
         points, whole = self.shown("pixels", "--stride", "3")
         self.assertAlmostEqual(len(points) / len(whole), 1 / 9, delta=0.01)

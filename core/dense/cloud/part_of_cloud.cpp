@@ -23,10 +23,12 @@ struct CubeHash {
   }
 };
 
+constexpr double kSmallestSideMm = 1e-6;  // holds one point, as floats are coarser; its numbers fit into 64 bits
+
 // Finds the most certain point of each cube.
 class CubesOfPoints {
  public:
-  explicit CubesOfPoints(double side_mm) : side_mm_(side_mm) {}
+  explicit CubesOfPoints(double side_mm) : side_mm_(std::max(side_mm, kSmallestSideMm)) {}
 
   /// @param index  of the point
   /// @return the index of the point that gives way, which may be this one; nothing if the cube was empty
@@ -87,7 +89,7 @@ void keep_part(std::vector<CloudPoint>& points, const CloudPart& part) {
 void keep_part(std::span<DenseView> views, const CloudPart& part) {
   const bool needs_place = part.box || part.side || part.voxel_mm > 0;
   if (!needs_place && part.stride <= 1) return;
-  CubesOfPoints cubes(std::max(part.voxel_mm, 1e-6));
+  CubesOfPoints cubes(part.voxel_mm);
   std::size_t first = 0;  // index of the view's first pixel among those of all views
   for (DenseView& view : views) {
     for_each_measured(view.map, [&](std::size_t pixel, int x, int y) {

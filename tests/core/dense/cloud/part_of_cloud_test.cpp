@@ -47,6 +47,18 @@ TEST(KeepPart, KeepsTheMostCertainPointOfEachCube) {
             (std::vector<CloudPoint>{point(2, 2, 502, 0.1F), point(-1, 1, 501, 0.5F), point(11, 1, 501, 0.2F)}));
 }
 
+TEST(KeepPart, KeepsAllPointsIfTheCubesAreTiny) {
+  const std::vector<CloudPoint> all{point(1, 1, 501, 0.3F), point(2, 2, 502, 0.1F), point(-3, 3, 503, 0.2F)};
+  for (const double side_mm : {1e-3, 1e-17, 1e-300, std::numeric_limits<double>::denorm_min()}) {
+    std::vector<CloudPoint> points = all;
+    keep_part(points, {.voxel_mm = side_mm});
+    EXPECT_EQ(points, all) << side_mm;
+    std::vector<DenseView> views{flat_view(10, 7, 1000)};
+    keep_part(views, {.voxel_mm = side_mm});
+    EXPECT_EQ(views[0].map.count(DensePixel::kMeasured), 70U) << side_mm;
+  }
+}
+
 TEST(KeepPart, KeepsEveryNthPixel) {
   std::vector<DenseView> views{flat_view(10, 7, 1000)};
   keep_part(views, {.stride = 3});
