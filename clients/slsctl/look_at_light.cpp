@@ -18,7 +18,8 @@ namespace {
 using nlohmann::json;
 
 tl::expected<GreyImage, Failure> take_frame(Connection& connection, const ClientOptions& options) {
-  json params{{"format", "raw"}, {"camera", options.camera}};
+  json params{{"format", "raw"}};
+  if (!options.camera.empty()) params["camera"] = options.camera;
   if (options.timeout_ms) params["timeout_ms"] = *options.timeout_ms;
   const auto answered = ask(connection, "frame", params);
   if (!answered) return tl::unexpected(answered.error());

@@ -70,8 +70,9 @@ std::optional<std::vector<double>> ParamReader::numbers(const char* name, const 
 std::string ParamReader::text(const char* name, std::size_t bytes_max) {
   const auto* value = find(name);
   if (value == nullptr) return {};
-  if (value->is_string() && value->get_ref<const std::string&>().size() <= bytes_max) return value->get<std::string>();
-  refuse(name, "a string of at most " + std::to_string(bytes_max) + " bytes");
+  const std::size_t bytes = value->is_string() ? value->get_ref<const std::string&>().size() : 0;
+  if (bytes > 0 && bytes <= bytes_max) return value->get<std::string>();
+  refuse(name, "a string of 1 to " + std::to_string(bytes_max) + " bytes");
   return {};
 }
 

@@ -35,7 +35,8 @@ class ParamReader {
   [[nodiscard]] int integer(const char* name, int otherwise, int low, int high);
   /// The number of that name; empty if missing.
   [[nodiscard]] std::optional<double> number(const char* name, double low, double high);
-  /// A text of at most this many bytes. It may contain control characters: use printable() before quoting it.
+  /// A text of 1 to this many bytes; empty if missing. It may contain control characters: use printable() before
+  /// quoting it.
   [[nodiscard]] std::string text(const char* name, std::size_t bytes_max = kMaxTextBytes);
   /// The list of numbers of that name; nothing if missing.
   [[nodiscard]] std::optional<std::vector<double>> numbers(const char* name, const NumberList& list);

@@ -3,6 +3,12 @@
 #include "daemon/rpc/request.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "core/printable.hpp"
 
 namespace slsd {
 namespace {
@@ -10,12 +16,15 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMaxIdBytes = 256;
+constexpr std::size_t kMaxQuotedNameBytes = 64;
+constexpr double kExactBelow = 9007199254740992.0;  // 2^53. Beyond it, and beyond 64 bits, digits would be lost
 
 tl::unexpected<BadRequest> refuse(json id, RpcError error) {
   return tl::unexpected(BadRequest{std::move(id), std::move(error)});
 }
 
 bool usable_as_id(const json& id) {
+  if (id.is_number_float()) return std::abs(id.get<double>()) < kExactBelow;
   if (id.is_string()) return id.get_ref<const std::string&>().size() <= kMaxIdBytes;
   return id.is_null() || id.is_number();
 }
@@ -67,6 +76,28 @@ JsonShape shape_of(std::string_view text) {
   return shape;
 }
 
+ParsedJson parse_json(std::string_view text) {
+  // The parser would take a null character for the end.
+  if (text.find('\0') != std::string_view::npos) return {json(json::value_t::discarded), {}};
+  std::optional<std::string> repeated;
+  std::vector<std::set<std::string>> names;  // of the objects that are open
+  const auto note = [&](int, json::parse_event_t event, json& parsed) {
+    if (event == json::parse_event_t::object_start) names.emplace_back();
+    if (event == json::parse_event_t::object_end) names.pop_back();
+    if (event == json::parse_event_t::key && !repeated) {
+      const auto& name = parsed.get_ref<const std::string&>();
+      if (!names.back().insert(name).second) repeated = name;
+    }
+    return true;
+  };
+  json value = json::parse(text, note, /*allow_exceptions=*/false);
+  return {std::move(value), std::move(repeated)};
+}
+
+std::string appears_twice(const std::string& name) {
+  return "\"" + printable(name, kMaxQuotedNameBytes) + "\" appears twice in one object: give it once";
+}
+
 tl::expected<Request, BadRequest> parse_request(std::string_view line) {
   const JsonShape shape = shape_of(line);
   if (shape.depth > kMaxNesting) {
@@ -77,9 +108,10 @@ tl::expected<Request, BadRequest> parse_request(std::string_view line) {
                   parse_error("more than " + std::to_string(kMaxValues) + " values: a request needs only a few"));
   }
   // Does not parse a truncated message: the parser's unused error would quote all of it.
-  json message = shape.closed ? json::parse(line, nullptr, /*allow_exceptions=*/false) : json(json::value_t::discarded);
+  auto [message, repeated] = shape.closed ? parse_json(line) : ParsedJson{json(json::value_t::discarded), {}};
   if (message.is_discarded()) {
-    return refuse(nullptr, parse_error("not JSON: send one JSON-RPC 2.0 object per line, in UTF-8"));
+    return refuse(nullptr, parse_error("not JSON, or a number beyond 1e308: send one JSON-RPC 2.0 object per line, in "
+                                       "UTF-8"));
   }
   if (message.is_array()) {
     return refuse(nullptr, invalid_request("batches are not supported: send one request per line"));
@@ -87,8 +119,10 @@ tl::expected<Request, BadRequest> parse_request(std::string_view line) {
   if (!message.is_object()) return refuse(nullptr, invalid_request("a request must be a JSON object"));
   json id = message.contains("id") ? message["id"] : json();
   if (!usable_as_id(id)) {
-    return refuse(nullptr, invalid_request("\"id\" must be a number, null or a string of at most 256 bytes"));
+    return refuse(nullptr,
+                  invalid_request("\"id\" must be a number of at most 64 bits, null or a string of at most 256 bytes"));
   }
+  if (repeated) return refuse(*repeated == "id" ? json() : std::move(id), invalid_request(appears_twice(*repeated)));
   return read_members(message, std::move(id));
 }
 

@@ -2,6 +2,7 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -29,6 +30,17 @@ struct BadRequest {
   nlohmann::json id;
   RpcError error;
 };
+
+/// A JSON text, and the first name that one of its objects has twice. Which of the two counts would be a guess.
+struct ParsedJson {
+  nlohmann::json value;  ///< discarded if the text is not JSON
+  std::optional<std::string> repeated;
+};
+/// @param text  any bytes
+/// @thread reentrant
+[[nodiscard]] ParsedJson parse_json(std::string_view text);
+/// Says so.
+[[nodiscard]] std::string appears_twice(const std::string& name);
 
 /// Reads one line without its line feed; it may contain any bytes.
 /// @thread reentrant

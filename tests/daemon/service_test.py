@@ -126,6 +126,17 @@ class Scan(unittest.TestCase):
             self.assertIn("result", message)
             self.assertEqual(client.socket.recv(1), b"")
 
+    def test_refuses_what_could_be_meant_in_two_ways(self):
+        with self.service.client() as client:
+            for params, word in (('{"format":"ply","format":"pcd"}', "twice"), ('{"preset":""}', "preset"), ('{"camera":""}', "camera"),
+                                 ('{"poses":"ur"}', "robot_pose")):
+                client.last_id = 7
+                client.send(b'{"jsonrpc":"2.0","id":7,"method":"scan","params":%s}\n' % params.encode())
+                with self.assertRaises(RpcError) as refused:
+                    client.reply()
+                self.assertIn(refused.exception.name, ("invalid_request", "invalid_params"))
+                self.assertIn(word, str(refused.exception))
+
     def test_refuses_wrong_parameters_with_a_hint(self):
         wrong = [("scan", {"formatt": "ply"}, "did you mean format?"), ("scan", {"format": "xyz"}, "ply"),
                  ("scan", {"timeout_ms": 0}, "1 to 600000"), ("scan", {"timeout_ms": 1e99}, "1 to 600000"),

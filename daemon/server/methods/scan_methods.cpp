@@ -269,6 +269,9 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
   const WantedInBase in_base{asked.form.in_base, part.in_base()};
   if (auto refused = refused_frame(in_base, pose, *state.scanner.setup(), Delivery::kOnce))
     return tl::unexpected(*refused);
+  if (pose.numbers.empty() && !pose.notation.empty())
+    return tl::unexpected(
+        invalid_params("\"poses\" tells how the robot writes \"robot_pose\": add that, or leave both out"));
   if (!pose.numbers.empty()) {
     const auto base_from_flange = pose_of(pose);
     if (!base_from_flange) return tl::unexpected(base_from_flange.error());

@@ -62,6 +62,17 @@ TEST(ParamReader, RefusesWrongTypesAndRanges) {
   }
 }
 
+// It is likelier an unset variable than a wish for the default.
+TEST(ParamReader, RefusesEmptyTexts) {
+  for (const json& value : {json(""), json(), json(3), json("12345")}) {
+    const json params{{"preset", value}};
+    ParamReader reader(params);
+    EXPECT_EQ(reader.text("preset", 4), "");
+    ASSERT_TRUE(reader.error()) << value;
+    EXPECT_THAT(reader.error()->message, HasSubstr("\"preset\" must be a string of 1 to 4 bytes")) << value;
+  }
+}
+
 TEST(ParamReader, ReadsListsOfNumbers) {
   const auto read = [](const json& value, std::size_t count_min) {
     const json params{{"box", value}};

@@ -58,6 +58,42 @@ TEST(ParseRequest, AnswersToTheIdWhereItCanBeRead) {
   EXPECT_EQ(request.error().id, 7);
 }
 
+TEST(ParseRequest, RefusesTwoMembersOfOneName) {
+  for (const char* line : {R"({"jsonrpc":"2.0","id":7,"method":"scan","method":"status"})",
+                           R"({"jsonrpc":"2.0","id":7,"method":"scan","params":{"stride":1,"stride":2}})",
+                           R"({"jsonrpc":"2.0","id":7,"method":"scan","params":{"stride":1,"strid\u0065":1}})",
+                           R"({"jsonrpc":"2.0","id":7,"method":"scan","params":{"a":[{},{"b":{"c":1},"b":2}]}})"}) {
+    const auto request = parse_request(line);
+    ASSERT_FALSE(request) << line;
+    EXPECT_EQ(request.error().error.code, -32600) << line;
+    EXPECT_EQ(request.error().id, 7) << line;
+    EXPECT_THAT(request.error().error.message, ::testing::HasSubstr("twice")) << line;
+  }
+  const auto two_ids = parse_request(R"({"jsonrpc":"2.0","id":7,"id":8,"method":"status"})");
+  ASSERT_FALSE(two_ids);
+  EXPECT_EQ(two_ids.error().id, nullptr);
+  EXPECT_EQ(code_of(R"({"jsonrpc":"2.0","method":"scan","params":{"a":{"b":1},"b":{"b":[{"b":1},{"b":1}]}}})"), 0);
+}
+
+TEST(ParseRequest, RefusesWhatFollowsANullCharacter) {
+  using namespace std::string_view_literals;
+  EXPECT_EQ(code_of("{\"jsonrpc\":\"2.0\",\"method\":\"status\"}\0"sv), -32700);
+  EXPECT_EQ(code_of("{\"jsonrpc\":\"2.0\",\"method\":\"status\"}\0, \"params\""sv), -32700);
+}
+
+TEST(ParseRequest, RefusesIdsThatItCannotRepeat) {
+  const auto with_id = [](const std::string& id) {
+    return parse_request(R"({"jsonrpc":"2.0","method":"status","id":)" + id + "}");
+  };
+  for (const char* id : {"18446744073709551615", "-9223372036854775808", "9007199254740993", "0.5", "1e5"})
+    EXPECT_TRUE(with_id(id)) << id;
+  for (const char* id : {"18446744073709551616", "-9223372036854775809", "1e300", "9007199254740993.0"}) {
+    ASSERT_FALSE(with_id(id)) << id;
+    EXPECT_EQ(with_id(id).error().error.code, -32600) << id;
+    EXPECT_EQ(with_id(id).error().id, nullptr) << id;
+  }
+}
+
 TEST(ParseRequest, BoundsTheDepth) {
   EXPECT_EQ(code_of(std::string(1000000, '[')), -32700);
   const std::string deep = std::string(kMaxNesting - 2, '[') + std::string(kMaxNesting - 2, ']');
