@@ -49,6 +49,7 @@ class PlainHelp : public CLI::Formatter {
 
 void refuse_options_as_values(CLI::App& app) {
   const auto lacks_value = [&app](const std::string& value) {
+    if (value.empty()) return std::string("an empty value: is a variable unset? Leave the option out for its default");
     for (const CLI::App* at = &app; at != nullptr; at = at->get_parent())
       if (at->get_option_no_throw(value) != nullptr) return "a value is missing before " + value;
     return std::string();

@@ -307,9 +307,12 @@ class Starts(unittest.TestCase):
         status, error = self.refused("--listen", "0.0.0.0")
         self.assertEqual(status, 1)
         self.assertIn("name the addresses that may connect: --allow", error)
-        for wrong in ("robot", "1.2.3", "1.2.3.4/33", "1.2.3.4/", "fd00::/129", "1.2.3.4/x", ""):
+        for wrong in ("robot", "1.2.3", "1.2.3.4/33", "1.2.3.4/", "fd00::/129", "1.2.3.4/x"):
             status, error = self.refused("--allow", wrong)
             self.assertEqual((status, error.count("\n")), (1, 1), (wrong, error))
+        status, error = self.refused("--allow", "")
+        self.assertEqual(status, 2)
+        self.assertIn("--allow: an empty value", error)
         self.assertEqual(self.refused("--listen", "nowhere")[0], 1)
         self.assertIn("choose an address of this machine", self.refused("--listen", "203.0.113.1", "--allow", "203.0.113.2")[1])
 
