@@ -158,7 +158,11 @@ void Relay::on_received(std::size_t bytes) {
 // The client may only have shut down its writing side, and still gets its answers.
 void Relay::on_peer_ended() {
   peer_ended_ = true;
-  if (phase_ != Phase::kClient) return close();
+  if (phase_ == Phase::kStranger && requests_.size() > 0) return judge_greeting(requests_.take_held());
+  phase_ == Phase::kClient ? pass_rest_on() : close();
+}
+
+void Relay::pass_rest_on() {
   to_service_ = requests_.take_rest();
   asio::async_write(service_, asio::buffer(to_service_),
                     [self = shared_from_this()](const std::error_code&, std::size_t) {
@@ -173,7 +177,11 @@ void Relay::read_greeting() {
   if (!line && deadline_.expiry() <= Clock::now())
     return refuse(nullptr, rpc_error({ErrorCode::kTimeout, "no token came in time; the connection ends", {}}));
   if (!line && requests_.size() <= kGreetingBytesMax) return read_peer();
-  auto greeting = tcp::read_greeting(line ? *line : std::string(kGreetingBytesMax + 1, ' '));
+  judge_greeting(line ? *line : std::string(kGreetingBytesMax + 1, ' '));
+}
+
+void Relay::judge_greeting(std::string_view line) {
+  const auto greeting = tcp::read_greeting(line);
   if (!greeting) return refuse(greeting.error().id, greeting.error().error);
   admit(*greeting);
 }
@@ -232,6 +240,7 @@ std::error_code Relay::connect_to_service() {
 
 // Reads no more from the client until the service took what came.
 void Relay::pass_on() {
+  if (peer_ended_) return pass_rest_on();  // Asio reports an end once: another read would wait for ever
   to_service_ = requests_.take();
   if (to_service_.empty()) return read_peer();
   asio::async_write(service_, asio::buffer(to_service_),

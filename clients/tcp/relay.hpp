@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <asio/io_context.hpp>
@@ -77,10 +78,12 @@ class Relay : public std::enable_shared_from_this<Relay> {  // shared: pending r
   void on_received(std::size_t bytes);
   void on_peer_ended();
   void read_greeting();
+  void judge_greeting(std::string_view line);
   void admit(const Greeting& greeting);
   void connect(const Greeting& greeting);
   [[nodiscard]] std::error_code connect_to_service();
   void pass_on();
+  void pass_rest_on();
   void read_service();
   void send_answer(std::size_t bytes);
   void refuse(const nlohmann::json& id, const RpcError& error);

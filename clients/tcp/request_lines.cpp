@@ -67,7 +67,7 @@ std::string RequestLines::take() {
   while (true) {
     while (const auto line = lines_.next_line()) taken += inline_request(*line);
     if (!lines_.overflown()) return taken;
-    const std::string rest = take_rest();
+    const std::string rest = take_held();
     const std::size_t end = rest.find('\n');
     in_long_line_ = end == std::string::npos;
     if (in_long_line_) return taken += rest;
@@ -77,9 +77,16 @@ std::string RequestLines::take() {
 }
 
 std::string RequestLines::take_rest() {
-  std::string rest(lines_.rest().value_or(std::string_view()));
+  const auto line = lines_.rest();
+  std::string rest = line ? inline_request(*line) : std::string();
   lines_.clear();
   return rest;
+}
+
+std::string RequestLines::take_held() {
+  std::string held(lines_.rest().value_or(std::string_view()));
+  lines_.clear();
+  return held;
 }
 
 }  // namespace slsd::tcp

@@ -42,6 +42,10 @@ TEST(RequestLines, AsksForCloudsInline) {
                                          "\n",
                                          1000));
   EXPECT_EQ(silent["params"]["transport"], "inline");
+  for (const std::size_t piece : {1, 1000}) {
+    const std::string last = passed("{}\n" + kMemfd, piece);  // ended by the connection's end
+    EXPECT_EQ(json::parse(last.substr(3))["params"]["transport"], "inline");
+  }
   EXPECT_FALSE(silent.contains("id"));
 }
 

@@ -91,6 +91,22 @@ class Serves(unittest.TestCase):
                 answers = connection.makefile("rb").read().splitlines()
             self.assertEqual([json.loads(line)["id"] for line in answers], list(range(50)))
 
+    def test_a_last_line_that_only_the_end_of_the_connection_ends(self):
+        with Service() as service, Tcp(service.socket) as tcp:
+            def said(data):
+                with tcp.connect() as connection:
+                    connection.sendall(data)
+                    connection.shutdown(socket.SHUT_WR)
+                    return connection.makefile("rb").read()
+            answer = said(greeting() + b'{"jsonrpc":"2.0","id":2,"method":"scan","params":{"transport":"memfd"}}')
+            _, reply, cloud = answer.split(b"\n", 2)
+            result = json.loads(reply)["result"]
+            self.assertEqual((result["bytes"], cloud[:4]), (len(cloud), b"ply\n"))
+            self.assertEqual(json.loads(said(greeting().rstrip(b"\n"))), {"jsonrpc": "2.0", "id": 1, "result": {}})
+            self.assertEqual(one_error(said(greeting("guess" * 4).rstrip(b"\n")))[0], "permission_denied")
+            self.assertEqual(one_error(said(b"{"))[0], "permission_denied")
+            self.assertEqual(said(b""), b"")
+
     def test_lines_that_come_byte_by_byte(self):
         with Service() as service, Tcp(service.socket) as tcp, tcp.connect() as connection:
             for byte in greeting() + b'{"jsonrpc":"2.0","id":2,"method":"settings"}\n':
