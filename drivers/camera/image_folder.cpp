@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cerrno>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -67,7 +68,10 @@ Result<> ImageFolder::list_folder() {
 Result<const GreyImage*> ImageFolder::image(std::size_t i) {
   Entry& entry = images_[i];
   const auto version = version_of(entry.path);
+  const bool gone = !version && errno == ENOENT;
   if (!version && !version_of(path_)) return fail(ErrorCode::kDisconnected, "is gone; put it back", path_.string());
+  // Its images may have been replaced by others.
+  if (gone) return fail(ErrorCode::kDisconnected, "is gone; the folder is listed again", entry.path.string());
   if (entry.decoded && version == entry.version) return &*entry.decoded;
   return decode(entry, version.value_or(Version{}));
 }

@@ -27,7 +27,7 @@ class ImageFolder {
   [[nodiscard]] std::size_t size() const { return images_.size(); }
 
   /// The i-th image as currently on disk; valid until the next call.
-  /// @errors as read_image(); kDisconnected if the folder itself, or the only image, is gone
+  /// @errors as read_image(); kDisconnected if the folder itself or the image is gone
   [[nodiscard]] Result<const GreyImage*> image(std::size_t i);
   /// Reads the colours of the i-th image, as then on disk, whenever it is called: see read_colours().
   [[nodiscard]] std::function<Result<ColourFrame>()> colours(std::size_t i) const {

@@ -83,6 +83,25 @@ TEST_F(FileCameraTest, NamesWhatIsWrongWithItsPath) {
   EXPECT_EQ(FileCamera(options()).open().error().code, ErrorCode::kMalformed);
 }
 
+TEST_F(FileCameraTest, ListsItsFolderAgainWhenAnImageGoes) {
+  test::record(folder_, 3);
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+  std::filesystem::remove(folder_.path() / "frame-1.pgm");
+  const auto gone = camera.capture(far_away());
+  EXPECT_EQ(gone.error().code, ErrorCode::kDisconnected);
+  EXPECT_THAT(gone.error().where, HasSubstr("frame-1.pgm"));
+  ASSERT_TRUE(camera.open());
+  for (const int expected : {0, 2, 0}) EXPECT_EQ(next(camera), expected);
+  for (const char* name : {"frame-0.pgm", "frame-2.pgm"}) std::filesystem::remove(folder_.path() / name);
+  EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
+  EXPECT_EQ(camera.open().error().code, ErrorCode::kNotFound);
+  test::record(folder_, 1);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+}
+
 TEST_F(FileCameraTest, IsDisconnectedWhenItsFolderGoes) {
   const std::filesystem::path path = folder_.path() / "frames";
   std::filesystem::create_directory(path);
