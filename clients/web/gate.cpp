@@ -8,7 +8,7 @@
 namespace slsd::web {
 namespace {
 
-constexpr std::string_view kBearer = "Bearer ";
+constexpr std::string_view kBearer = "bearer ";
 
 std::string lower(std::string_view text) {
   std::string result(text);
@@ -61,7 +61,7 @@ std::optional<Refusal> Gate::check(const Request& request, Clock::time_point now
   if (auto refused = check_origin(request)) return refused;
   const std::lock_guard lock(mutex_);
   const std::string_view authorization = request.authorization;
-  if (authorization.starts_with(kBearer))
+  if (lower(authorization.substr(0, kBearer.size())) == kBearer)  // a scheme's name may have capitals or not
     return check_token(request.address, authorization.substr(kBearer.size()), now);
   if (knows(request, now)) return std::nullopt;
   return Refusal{401, "no_token",

@@ -17,9 +17,11 @@
 #include "clients/web/away.hpp"
 #include "clients/web/boards.hpp"
 #include "core/base64.hpp"
+#include "core/nearest_name.hpp"
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/rpc/message.hpp"
+#include "daemon/rpc/request.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd::web {
@@ -53,6 +55,25 @@ Answer refusal(int status, const std::string& name, const std::string& message) 
 
 Answer json_answer(const json& value) {
   return {200, "application/json", client::Bytes(to_line(value)), {}, {}};
+}
+
+Answer no_such_parameter(const std::string& name, const std::vector<std::string>& known) {
+  return refusal(400, "invalid_params",
+                 "no such parameter: \"" + printable(name, 64) + "\"" + nearest_hint(name, known));
+}
+
+std::optional<Answer> unknown_parameter(const std::map<std::string, std::string>& query,
+                                        const std::vector<std::string>& known) {
+  for (const auto& [name, value] : query)
+    if (std::ranges::find(known, name) == known.end()) return no_such_parameter(name, known);
+  return std::nullopt;
+}
+
+/// The same for a request's body.
+std::optional<Answer> unknown_parameter(const json& body, const std::vector<std::string>& known) {
+  for (const auto& [name, value] : body.items())
+    if (std::ranges::find(known, name) == known.end()) return no_such_parameter(name, known);
+  return std::nullopt;
 }
 
 std::string parameter(const Request& request, const char* name) {
@@ -187,7 +208,8 @@ std::optional<Answer> PageServer::refuse(const Request& request) {
   }
   if (route == routes_.end()) return refusal(404, "not_found", "there is nothing at this address");
   const std::string& method = route->second.method;
-  if (request.method == method || (request.method == "HEAD" && method == "GET")) return std::nullopt;
+  if (request.method == method || (request.method == "HEAD" && method == "GET"))
+    return is_open ? std::nullopt : unknown_parameter(request.query, route->second.names);
   Answer wrong = refusal(405, "invalid_request", "use the method " + method);
   wrong.headers.emplace_back("Allow", method == "GET" ? "GET, HEAD" : method);
   return wrong;
@@ -195,14 +217,14 @@ std::optional<Answer> PageServer::refuse(const Request& request) {
 
 void PageServer::add_pages() {
   for (const Page& page : pages()) {
-    routes_[std::string(page.path)] = {"GET", true, [this, page](const Request& request) {
+    routes_[std::string(page.path)] = {"GET", true, {}, [this, page](const Request& request) {
                                          return page.path == "/" ? index(page, request) : page_answer(page);
                                        }};
   }
   // Debian's files, under fixed names: requests cannot choose a path.
   for (const auto& [path, file] : {std::pair{"/three.js", "three.min.js"},
                                    std::pair{"/orbit_controls.js", "examples/js/controls/OrbitControls.js"}}) {
-    routes_[path] = {"GET", true, [file = options_.three / file](const Request&) {
+    routes_[path] = {"GET", true, {}, [file = options_.three / file](const Request&) {
                        auto script = read_file(file, kScriptBytesMax);
                        if (!script)
                          return refusal(
@@ -244,10 +266,11 @@ Answer PageServer::log_in(const Request& request, const json& body) {
 }
 
 void PageServer::post(const char* path, bool open, HandleBody handle) {
-  routes_[path] = {"POST", open, [handle = std::move(handle)](const Request& request) {
-                     const json body = json::parse(request.body, nullptr, /*allow_exceptions=*/false);
+  routes_[path] = {"POST", open, {}, [handle = std::move(handle)](const Request& request) {
+                     const auto [body, repeated] = parse_json(request.body);
                      if (!body.is_object())
                        return refusal(400, "invalid_request", "the request's body is not a JSON object");
+                     if (repeated) return refusal(400, "invalid_request", appears_twice(*repeated));
                      return handle(request, body);
                    }};
 }
@@ -260,17 +283,18 @@ void PageServer::pass_on(const char* path, const char* method) {
 
 void PageServer::add_requests() {
   get("/api/status", [this](const Request&) { return status(); });
-  get("/api/frame", [this](const Request& request) { return image(request, "frame"); });
-  get("/api/reasons", [this](const Request& request) { return reasons(request); });
-  get("/api/preview", [this](const Request& request) { return image(request, "preview"); });
-  get("/api/cloud", [this](const Request& request) { return cloud(request); });
-  get("/api/past", [this](const Request& request) { return past(request); });
+  get("/api/frame", {"camera", "as_shown", "format"},
+      [this](const Request& request) { return image(request, "frame"); });
+  get("/api/reasons", {"camera"}, [this](const Request& request) { return reasons(request); });
+  get("/api/preview", {"camera"}, [this](const Request& request) { return image(request, "preview"); });
+  get("/api/cloud", {"density", "after", "organised"}, [this](const Request& request) { return cloud(request); });
+  get("/api/past", {"scan"}, [this](const Request& request) { return past(request); });
   get("/api/metrics", [this](const Request&) {
     const auto answered = call("metrics", {{"format", "prometheus"}}, kTimeout);
     if (!answered) return refusal_of(answered.error());
     return Answer{200, "text/plain; version=0.0.4; charset=utf-8", answered->reply.bytes, {}, {}};
   });
-  get("/api/exposure", [this](const Request& request) {
+  get("/api/exposure", {"camera"}, [this](const Request& request) {
     ClientOptions options;
     options.socket = options_.socket;
     options.camera = parameter(request, "camera");
@@ -279,12 +303,12 @@ void PageServer::add_requests() {
   });
   get("/api/presets", [this](const Request&) { return result_or_refusal(call("presets", json::object(), kTimeout)); });
   get("/api/boards", [this](const Request&) { return boards(); });
-  get("/api/board", [this](const Request& request) { return board(request); });
+  get("/api/board", {"name"}, [this](const Request& request) { return board(request); });
   get("/api/calibration", [this](const Request&) {
     return result_or_refusal(call("calibrate", {{"action", "look"}}, kTimeout));
   });
   get("/api/hand_eye", [this](const Request&) { return hand_eye(); });
-  get("/api/hand_eye/look", [this](const Request& request) { return look(request); });
+  get("/api/hand_eye/look", {"look", "camera"}, [this](const Request& request) { return look(request); });
   get("/api/hand_eye/file", [this](const Request&) {
     auto text = read_file(hand_eye_.file(), kResultBytesMax);
     if (!text) return refusal(404, "not_found", "there is no result yet: take more looks");
@@ -296,6 +320,7 @@ void PageServer::add_requests() {
   });
   post("/api/scan", false, [this](const Request&, const json& body) { return scan(body); });
   post("/api/project", false, [this](const Request&, const json& body) {
+    if (auto unknown = unknown_parameter(body, {"picture"})) return std::move(*unknown);
     const auto picture = body.find("picture");
     if (picture == body.end() || !picture->is_string() || *picture == "image")
       return refusal(400, "invalid_params", "\"picture\" must be the name of a picture");
@@ -314,7 +339,7 @@ void PageServer::add_model_requests() {
     auto points = model_.preview();
     return points ? cloud_answer(std::move(*points), about) : answer_of(points.error());
   });
-  get("/api/model/file", [this](const Request& request) {
+  get("/api/model/file", {"format"}, [this](const Request& request) {
     auto file = model_.file(parameter(request, "format"));
     return file ? cloud_answer(std::move(*file), json::object()) : answer_of(file.error());
   });
@@ -322,7 +347,10 @@ void PageServer::add_model_requests() {
     const auto done = model_.act(body);
     return done ? json_answer(*done) : answer_of(done.error());
   });
-  post("/api/model/background", false, [this](const Request&, const json&) { return take_background(); });
+  post("/api/model/background", false, [this](const Request&, const json& body) {
+    auto unknown = unknown_parameter(body, {});
+    return unknown ? std::move(*unknown) : take_background();
+  });
 }
 
 /// A cloud of the scene without the object.
@@ -373,8 +401,12 @@ Answer PageServer::status() {
 Answer PageServer::image(const Request& request, const char* method) const {
   json params = json::object();
   if (const std::string camera = parameter(request, "camera"); !camera.empty()) params["camera"] = camera;
-  if (parameter(request, "as_shown") == "1") params["as_shown"] = true;
-  const bool raw = parameter(request, "format") == "raw" && method == std::string_view("frame");
+  const std::string as_shown = parameter(request, "as_shown"), format = parameter(request, "format");
+  if (!as_shown.empty() && as_shown != "1") return refusal(400, "invalid_params", "\"as_shown\" must be 1");
+  if (!format.empty() && format != "png" && format != "raw")
+    return refusal(400, "invalid_params", "\"format\" must be \"png\" or \"raw\"");
+  if (!as_shown.empty()) params["as_shown"] = true;
+  const bool raw = format == "raw";
   if (raw) params["format"] = "raw";
   auto answered = call(method, params, kTimeout);
   if (!answered) return refusal_of(answered.error());

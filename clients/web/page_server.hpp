@@ -66,8 +66,9 @@ class PageServer {
  private:
   /// One address: its method, its secret, its answer.
   struct Route {
-    std::string method;  ///< GET (also serves HEAD) or POST
-    bool open;           ///< needs no secret: shows no data and does nothing
+    std::string method;              ///< GET (also serves HEAD) or POST
+    bool open;                       ///< needs no secret: shows no data and does nothing
+    std::vector<std::string> names;  ///< of its address's parameters; an open one ignores others
     std::function<Answer(const Request&)> answer;
   };
   using Handle = std::function<Answer(const Request&)>;
@@ -75,7 +76,10 @@ class PageServer {
 
   void add_pages();
   void add_requests();
-  void get(const char* path, Handle handle) { routes_[path] = {"GET", false, std::move(handle)}; }
+  void get(const char* path, Handle handle) { get(path, {}, std::move(handle)); }
+  void get(const char* path, std::vector<std::string> names, Handle handle) {
+    routes_[path] = {"GET", false, std::move(names), std::move(handle)};
+  }
   void post(const char* path, bool open, HandleBody handle);
   void pass_on(const char* path, const char* method);
   [[nodiscard]] std::optional<Answer> refuse(const Request& request);

@@ -103,6 +103,14 @@ class Door(unittest.TestCase):
                     web.get("/api/cloud?density=symbols&after=1&organised=1"): (400, "invalid_params"),
                     web.get("/api/cloud?density=pixels&after=1&organised=yes"): (400, "invalid_params"),
                     web.get("/api/past?scan=..%2f..%2fetc"): (404, "not_found"),
+                    web.get("/api/frame?camra=left"): (400, "invalid_params"),
+                    web.get("/api/frame?as_shown=true"): (400, "invalid_params"),
+                    web.get("/api/frame?format=RAW"): (400, "invalid_params"),
+                    web.get("/api/status?camera=left"): (400, "invalid_params"),
+                    web.get("/api/preview?format=raw"): (400, "invalid_params"),
+                    web.post("/api/scan?density=pixels"): (400, "invalid_params"),
+                    web.post("/api/project", picture="white", timeout_ms=5): (400, "invalid_params"),
+                    web.post("/api/model/background", density="pixels"): (400, "invalid_params"),
                     web.get("/api/frame?camera=nobody"): (502, "not_found"),
                     web.get("/api/nothing"): (404, "not_found")}.items():
                 self.assertEqual(name_of(answer), expected)
