@@ -2,7 +2,11 @@
 // Copyright the slsd authors
 #include "clients/usage/usage.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -46,6 +50,14 @@ class PlainHelp : public CLI::Formatter {
     return " " + type + (option->get_expected_max() == CLI::detail::expected_max_vector_size ? " ..." : "");
   }
 };
+
+// A closed standard stream would pass its number on to the next file or socket, and text meant for the stream would go
+// there. Opened the wrong way round, its use still fails.
+void hold_standard_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF)
+      (void)::open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY);
+}
 
 void refuse_options_as_values(CLI::App& app) {
   const auto lacks_value = [&app](const std::string& value) {
@@ -180,6 +192,7 @@ CLI::Validator between(double least, double most) {
 }
 
 std::optional<int> parse_usage(CLI::App& app, int argc, const char* const* argv, const std::function<void()>& check) {
+  hold_standard_streams();
   refuse_options_as_values(app);
   const auto help = std::make_shared<PlainHelp>();
   app.formatter(help);

@@ -20,9 +20,10 @@ namespace slsd {
 /// Accepts a number from `least` to `most`, both included.
 [[nodiscard]] CLI::Validator between(double least, double most);
 
-/// Parses the command line of a program. Prints help or version, or one sentence on standard error about wrong usage.
-/// For a misspelt command or option it suggests the nearest; for a missing command it lists all. An option is never
-/// taken as another option's value: `--pattern --help` would write a picture of that name.
+/// Parses the command line of a program. Call it first: standard streams that are closed get their numbers back. Prints
+/// help or version, or one sentence on standard error about wrong usage. For a misspelt command or option it suggests
+/// the nearest; for a missing command it lists all. An option is never taken as another option's value: `--pattern
+/// --help` would write a picture of that name.
 /// @param app    has the program's name
 /// @param check  further checks after parsing; throws CLI::ParseError
 /// @return  nothing if the program should run, else the exit status: 0, or 2 for wrong usage

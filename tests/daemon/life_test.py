@@ -4,6 +4,7 @@
 """The whole service from its start to its end: its socket, its signals, what it loads anew and what it uses up."""
 import contextlib
 import os
+import pathlib
 import resource
 import signal
 import socket
@@ -313,6 +314,20 @@ class Life(unittest.TestCase):
                     other.send(b"rubbish\n")
             after = client.call("status")[0]["resident_bytes"]
             self.assertLess(after, before * 1.05 + 1e6)
+
+    def test_closed_standard_streams_get_no_other_file(self):
+        def close_streams():
+            for stream in range(3):
+                os.close(stream)
+        service = Service()
+        service.process = subprocess.Popen([BIN / "slsd", "--config", service.file], preexec_fn=close_streams)
+        with contextlib.ExitStack() as end:
+            end.callback(service.__exit__)
+            wait_until(service.socket.exists, "the socket")
+            folder = pathlib.Path(f"/proc/{service.process.pid}/fd")
+            self.assertEqual([os.readlink(folder / str(stream)) for stream in range(3)], ["/dev/null"] * 3)
+            with service.client() as client:
+                client.call("scan")
 
     def test_starts_without_camera_and_calibration(self):
         with Service(configuration='[server]\nsocket = "slsd.sock"\n') as service, service.client() as client:
