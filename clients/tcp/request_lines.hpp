@@ -44,7 +44,7 @@ class RequestLines {
   [[nodiscard]] std::optional<std::string_view> first_line() { return lines_.next_line(); }
   /// Takes what can be passed on now: whole lines, and pieces of longer ones.
   [[nodiscard]] std::string take();
-  /// What waits for the end of its line, unchanged.
+  /// Bytes that wait for the end of their line, unchanged.
   [[nodiscard]] std::string take_held();
   /// The same as a request, with a line feed.
   [[nodiscard]] std::string take_rest();
