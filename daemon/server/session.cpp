@@ -319,10 +319,7 @@ void Session::write() {
     const ssize_t sent = send_part(socket_.native_handle(), front, sent_);
     if (sent < 0 && errno == EINTR) continue;
     if (sent < 0 && errno == ETOOMANYREFS && front.descriptor) {
-      const Error error{
-          ErrorCode::kNoSpace, "too many file descriptors wait for clients to receive them: try again later", {}};
-      outgoing_.front().line = to_line(error_message(id_, rpc_error(error)));
-      outgoing_.front().descriptor = FileDescriptor();
+      withhold_descriptor();
       continue;
     }
     if (sent < 0 && errno != EAGAIN) return end();
@@ -343,6 +340,17 @@ void Session::write() {
   }
   writing_ = false;
   end_where_done();
+}
+
+// Sends the error in place of the message.
+void Session::withhold_descriptor() {
+  Outgoing& front = outgoing_.front();
+  const RpcError error = rpc_error(
+      {ErrorCode::kNoSpace, "too many file descriptors wait for clients to receive them: try again later", {}});
+  front.line =
+      to_line(is_event(front) ? event_message("scan_failed", {{"error", error.to_json()}}) : error_message(id_, error));
+  front.descriptor = FileDescriptor();
+  if (is_event(front) && subscription_) subscription_->note_lost(1);  // the next event reports it
 }
 
 void Session::finish_message() {

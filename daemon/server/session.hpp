@@ -129,6 +129,7 @@ class Session : public std::enable_shared_from_this<Session> {  // shared with t
   void weigh_waiting();
   void send_waiting_event();
   void write();
+  void withhold_descriptor();
   void finish_message();
   void watch_progress();
   void drop();

@@ -2,13 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """Subscriptions to the clouds of the whole service."""
+import ctypes
 import json
+import os
+import resource
 import socket
 import time
 import unittest
 
+from client import RpcError
 from point_cloud import vertices
 from service import Service, wait_until
+
+
+PR_CAPBSET_DROP, CAP_SYS_ADMIN, CAP_SYS_RESOURCE = 24, 21, 24
 
 
 class Subscription(unittest.TestCase):
@@ -31,6 +38,27 @@ class Subscription(unittest.TestCase):
                     time.sleep(0.5)
                     return other.call("status")[0]["scans"]["succeeded"] == before
                 wait_until(rests, "an end of the scans")  # some may be under way still
+
+    def test_a_cloud_whose_descriptor_cannot_be_sent_is_told_as_an_event(self):
+        """As the kernel limits how many a user's processes may have under way, by the sender's limit of open files."""
+        def limit():
+            resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))
+            for capability in (CAP_SYS_ADMIN, CAP_SYS_RESOURCE):  # root's processes would not be limited
+                ctypes.CDLL(None).prctl(PR_CAPBSET_DROP, capability, 0, 0, 0)
+        here, there = socket.socketpair()
+        with here, there, Service(preexec=limit) as service, service.client() as client, open(os.devnull, "rb") as file:
+            service.wait_ready()
+            for _ in range(5):
+                socket.send_fds(here, [b"x"], [file.fileno()] * 20)
+            client.call("subscribe", transport="memfd")
+            for _ in range(3):
+                event, _ = client.receive()
+                self.assertEqual((event["method"], event["params"]["error"]["data"]["name"]), ("scan_failed", "no_space"))
+                self.assertNotIn("id", event)
+            client.call("status")
+            with self.assertRaises(RpcError) as failed:
+                client.call("scan", transport="memfd")
+            self.assertEqual(failed.exception.name, "no_space")
 
     def test_last_request_of_a_subscriber_is_answered(self):
         for _ in range(3):
