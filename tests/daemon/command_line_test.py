@@ -225,9 +225,9 @@ class Usage(unittest.TestCase):
                  ("scan", "--timeout-ms", "0"): 'slsctl scan: --timeout-ms: "0" is not a number from 1 to 600000',
                  ("watch", "--count", "1.5"): "slsctl watch: --count takes a whole number",
                  ("watch", "--count"): "slsctl watch: --count needs a value",
-                 ("scan", "a.ply", "--preset", ""): "slsctl scan: --preset: an empty value: is a variable unset?",
-                 ("scan", "a.ply", "--camera="): "slsctl scan: --camera",
-                 ("status", "--socket", ""): "slsctl status: --socket: an empty value",
+                 ("scan", "a.ply", "--preset", ""): "slsctl scan: --preset: an empty value: is a variable unset? Leave the option out for its default",
+                 ("scan", "a.ply", "--camera="): "slsctl scan: --camera needs a value",
+                 ("status", "--socket", ""): "slsctl status: --socket: an empty value: is a variable unset? Leave the option out for its default",
                  ("status", "now"): 'slsctl status: unexpected argument "now"',
                  ("light", "--from", "a.png", "b.png", "c.png"):
                      'slsctl light: --from takes one or two frames of one camera, not 3: leave out "c.png"',
