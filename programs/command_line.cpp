@@ -16,7 +16,7 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
   CalibrateRequest& request = line.request;
   auto* calibrate = app.get_option("--calibrate");
   auto* latency =
-      app.add_flag("--latency", line.latency, "with --calibrate: measure how late each camera sees the projector");
+      app.add_flag("--latency", line.latency, "with --calibrate: measure the delay from the projector to each camera");
   latency->needs(calibrate);
   app.add_option("--output", request.output, "with --calibrate: the calibration file to write")->needs(calibrate);
   app.add_option("--from", request.from, "read captures from this folder instead of using hardware")->excludes(latency);
@@ -25,8 +25,7 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
          "charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY (squares), chessboard:COLSxROWS:SQUARE_MM (inner corners), "
          "circles:COLSxROWS:SPACING_MM:DIAMETER_MM, plane:COLSxROWS:PITCH_MM:MARKER_MM:DICTIONARY")
       ->excludes(latency);
-  app.add_option("--ruler", request.ruler,
-                 "NOMINAL:MEASURED, in mm: the length on the print's ruler, and what it measures")
+  app.add_option("--ruler", request.ruler, "NOMINAL:MEASURED, in mm: the printed ruler's nominal and measured length")
       ->excludes(latency);
   app.add_option("--plane", request.plane,
                  "with --calibrate: the reference plane for the second step, such as plane:8x5:100:40:DICT_4X4_50")
@@ -37,14 +36,15 @@ void add_calibration_options(CLI::App& app, CommandLine& line) {
   app.add_option("--planes", request.planes, "with --plane: how many views of the plane to take")
       ->check(between(1, 99))
       ->needs("--plane");
-  app.add_option("--use", request.use, "with --calibrate --from: FIRST:LAST, use only these poses")
+  app.add_option("--use", request.use, "with --calibrate --from: use only the poses FIRST:LAST")
       ->needs(calibrate)
       ->needs("--from");
   app.add_flag("--force", request.force, "with --calibrate: replace the calibration in force even if the scale differs")
       ->needs(calibrate);
   const auto choose_code = [&request](const std::string& code) { request.gray_code = code == "gray"; };
   app.add_option_function<std::string>(
-         "--code", choose_code, "what to project: the pattern, or a Gray code, which takes many pictures per pose")
+         "--code", choose_code,
+         "with --calibrate: project the pattern, or a Gray code, which takes many pictures per pose")
       ->check(one_of({"pattern", "gray"}))
       ->needs(calibrate);
   app.add_option("--poses", request.poses, "with --calibrate: how many poses to take")
@@ -66,13 +66,13 @@ CLI::Option* add_print_options(CLI::App& app, PrintRequest& request) {
   app.add_option("--paper", request.paper, "the paper to print on; WIDTHxHEIGHT is in mm")
       ->type_name("{A0,A1,A2,A3,A4,letter} or WIDTHxHEIGHT")
       ->needs(print);
-  app.add_option("--dpi", request.dpi, "with --print-board FILE.png: its resolution")->needs(print);
+  app.add_option("--dpi", request.dpi, "with --print-board FILE.png: the resolution")->needs(print);
   return print;
 }
 
 void add_extrinsics_options(CLI::App& app, ExtrinsicsRequest& request) {
   auto* extrinsics = app.add_option("--extrinsics", request.file,
-                                    "measure with a board where several scanners stand, and write it to this file");
+                                    "measure the poses of several scanners with a board, and write them to this file");
   app.add_option("--scanner", request.scanners, "with --extrinsics: NAME=SOCKET; the first defines the common frame")
       ->needs(extrinsics);
   app.add_option("--parent", request.parent, "with --extrinsics: the name of that frame (cell)")->needs(extrinsics);
@@ -102,9 +102,9 @@ void add_options(CLI::App& app, CommandLine& line) {
   auto* verify =
       app.add_flag("--verify", line.verify, "check the calibration in force by measuring a board or a plane");
   auto* correct = app.add_flag("--correct", line.request.correct,
-                               "repair the calibration in force from one look at a board, if it drifted");
-  auto* undo =
-      app.add_flag("--undo", line.undo, "with --correct: bring back the calibration as it was before")->needs(correct);
+                               "repair the calibration in force from one view of a board, if it drifted");
+  auto* undo = app.add_flag("--undo", line.undo, "with --correct: restore the calibration from before the corrections")
+                   ->needs(correct);
   add_calibration_options(app, line);
   undo->excludes("--from")->excludes("--board");
   for (auto* other : {calibrate, verify, pattern, check, check_configuration, list}) correct->excludes(other);

@@ -28,10 +28,9 @@ Result<double> print_scale(std::string_view ruler, std::string_view option) {
   const auto nominal = number(ruler.substr(0, colon));
   const auto measured = colon == std::string_view::npos ? std::nullopt : number(ruler.substr(colon + 1));
   if (!nominal || !measured) {
-    return fail(
-        ErrorCode::kInvalidArgument,
-        "must be NOMINAL:MEASURED in mm, such as 200:194.2: the length on the print's ruler, and what it measures",
-        fmt::format("{} {}", option, ruler));
+    return fail(ErrorCode::kInvalidArgument,
+                "must be NOMINAL:MEASURED in mm, such as 200:194.2: the printed ruler's nominal and measured length",
+                fmt::format("{} {}", option, ruler));
   }
   const double scale = *measured / *nominal;
   if (scale < kScaleMin || scale > kScaleMax) {
@@ -51,7 +50,7 @@ Result<Board> as_printed(std::string_view text, std::string_view ruler, std::str
   if (!scale) return tl::unexpected(scale.error());
   if (std::abs(*scale - 1) > kTrueScale) {
     std::cout << fmt::format(
-        "the print is {:.1f} % off its scale, as by a printer's \"fit to page\"; slsd uses it as it is\n",
+        "the print's scale is {:.1f} % off, as after a printer's \"fit to page\"; slsd uses the measured scale\n",
         100 * (*scale - 1));
   }
   return board->scaled(*scale);

@@ -44,13 +44,12 @@ Result<> check_cameras(const CalibrateRequest& request, const std::vector<std::s
   if (!request.output.empty() || configuration.cameras.size() < 2) return {};
   for (const CameraOptions& camera : configuration.cameras) {
     if (std::ranges::find(names, camera.name()) != names.end()) continue;
-    return fail(
-        ErrorCode::kMismatch,
-        fmt::format("has no pictures of camera \"{}\", which is configured, and slsd does not start without it in "
-                    "the calibration: take poses with all cameras, leave its [[camera]] table out, or keep the "
-                    "calibration elsewhere with --output",
-                    printable(camera.name(), 64)),
-        request.from.string());
+    return fail(ErrorCode::kMismatch,
+                fmt::format("has no pictures of camera \"{}\", and slsd starts only if the calibration has every "
+                            "configured camera: take poses with all cameras, remove its [[camera]] table, or write the "
+                            "calibration elsewhere with --output",
+                            printable(camera.name(), 64)),
+                request.from.string());
   }
   return {};
 }
@@ -73,7 +72,7 @@ Result<> keep_part(const std::string& use, std::vector<CapturedPose>& poses) {
   for (const std::string& name : {first, last}) {
     if (std::ranges::find(poses, name, &CapturedPose::name) != poses.end()) continue;
     return fail(ErrorCode::kInvalidArgument,
-                "names no existing pose: write FIRST:LAST, such as " + poses.front().name + ":" + poses.back().name,
+                "matches no pose: write FIRST:LAST, such as " + poses.front().name + ":" + poses.back().name,
                 "--use " + use);
   }
   std::erase_if(poses, [&](const CapturedPose& pose) {
@@ -86,7 +85,7 @@ Result<std::vector<CapturedPose>> list_all(const std::filesystem::path& folder, 
   auto poses = list_captures_with_planes(folder, knows_plane);
   if (!poses || !knows_plane || poses->back().subject == PoseSubject::kPlane) return poses;
   return fail(ErrorCode::kNotFound,
-              "has no view of the reference plane of --plane: plane_NN/white.png with pattern.png beside it",
+              "has no view of the reference plane for --plane: add plane_NN/white.png and plane_NN/pattern.png",
               folder.string());
 }
 
@@ -123,11 +122,12 @@ Result<> calibrate_from_files(const CalibrateRequest& request) {
   if (!captures) return tl::unexpected(captures.error());
   if (captures->observations.count(PoseSubject::kBoard) == 0) {
     return tl::unexpected(refused(
-        *file, {ErrorCode::kNotFound, "no pose can be used:" + refusals(captures->refused), request.from.string()},
+        *file, {ErrorCode::kNotFound, "no pose is usable:" + refusals(captures->refused), request.from.string()},
         captures->refused));
   }
   const Board& found = observers.board.board();
-  if (!(found == *board)) std::cout << fmt::format("the board is {}: --board gave rows by columns\n", to_string(found));
+  if (!(found == *board))
+    std::cout << fmt::format("the board is {}: --board had its columns and rows swapped\n", to_string(found));
   auto outcome = calibrate(std::move(captures->observations), calibrate_options(*configuration, found));
   if (!outcome) return tl::unexpected(refused(*file, outcome.error(), captures->refused));
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;

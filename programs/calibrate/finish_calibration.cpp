@@ -35,8 +35,8 @@ Result<path> checked(path file, const std::string& named_by) {
     if (auto place = check_writable(written); !place) {
       Error error = place.error();
       error.message +=
-          "; nothing was started, because the calibration and its report go there: make it writable, or choose another "
-          "place with --output";
+          "; slsd has not started to calibrate, because it writes the calibration and its report there: make it "
+          "writable, or choose another place with --output";
       return tl::unexpected(std::move(error));
     }
   }

@@ -78,9 +78,9 @@ Result<> check_scale(const RigComparison& comparison, const Board& board, const 
   if (std::abs(percent) < std::max(kScalePercent, kScaleSigmas * comparison.longer_sigma_percent)) return {};
   return fail(
       ErrorCode::kMismatch,
-      fmt::format("{} measures {:.2f} mm where the board should have {:.2f} mm, {:.1f} % {}, and the rig has not "
-                  "changed otherwise: measure the print's ruler, and give the result with --ruler. If the new "
-                  "calibration is right, replace the one in force with --force, or save it elsewhere with --output",
+      fmt::format("{} measures {:.2f} mm for a board spacing of {:.2f} mm, {:.1f} % {}, and the rig has not changed "
+                  "otherwise: measure the print's ruler, and pass the result with --ruler. If the new calibration is "
+                  "right, replace the one in force with --force, or save it elsewhere with --output",
                   dated(before), board.pitch_mm * (1 + percent / 100), board.pitch_mm, std::abs(percent),
                   percent > 0 ? "more" : "less"));
 }

@@ -73,7 +73,7 @@ Result<Scanner> open_scanner(const std::string& text) {
   } catch (const client::ScannerError& error) {
     return fail(code_of(error), error.what(), name);
   } catch (const json::exception&) {
-    return fail(ErrorCode::kMalformed, "the program that answers is not slsd of this version", name);
+    return fail(ErrorCode::kMalformed, "the program at this socket is not this version of slsd", name);
   }
 }
 
@@ -106,7 +106,7 @@ Result<CloudLook> look(Scanner& scanner, const Board& board) {
   } catch (const client::ScannerError& error) {
     return fail(code_of(error), error.what(), scanner.name);
   } catch (const json::exception&) {
-    return fail(ErrorCode::kMalformed, "the program that answers is not slsd of this version", scanner.name);
+    return fail(ErrorCode::kMalformed, "the program at this socket is not this version of slsd", scanner.name);
   }
   if (!white) return fail(ErrorCode::kMalformed, "the scan lacks its white frame", scanner.name);
   if (const double moved = told.value("white_differs", 0.0); moved > kMovedMax) {
@@ -128,7 +128,7 @@ std::string quoted(const std::string& text) {
 std::string file_text(const ExtrinsicsRequest& request, const std::vector<Scanner>& scanners, const Board& board,
                       const PlacedScanners& placed) {
   std::string text = fmt::format(
-      "# Where scanners stand, measured by slsd --extrinsics. Lengths in mm.\nparent = {}\ndate = {}\nboard = {}\n",
+      "# Poses of scanners, measured by slsd --extrinsics. Lengths in mm.\nparent = {}\ndate = {}\nboard = {}\n",
       quoted(request.parent), quoted(utc_text(std::chrono::system_clock::now())), quoted(to_string(board)));
   for (std::size_t i = 0; i < scanners.size(); ++i) {
     const PlacedScanner& one = placed.scanners[i];
@@ -207,7 +207,7 @@ Result<> measure_extrinsics(const ExtrinsicsRequest& request, const CalibrateReq
   const auto wanted = static_cast<std::size_t>(request.places);
   std::string line;
   while (places.size() < wanted) {
-    std::cout << fmt::format("Place {} of {}: put {} where two scanners or more see it, and press Enter.",
+    std::cout << fmt::format("Place {} of {}: put {} where at least two scanners see it, and press Enter.",
                              places.size() + 1, wanted, describe(*board))
               << std::endl;
     if (!std::getline(std::cin, line)) break;
@@ -233,10 +233,10 @@ Result<> measure_extrinsics(const ExtrinsicsRequest& request, const CalibrateReq
     const PlacedScanner& one = placed->scanners[i];
     const Eigen::Vector3d& at = one.first_from_scanner.translation;
     std::cout << fmt::format(
-        "{} stands at ({:.2f}, {:.2f}, {:.2f}) mm in the frame of {}; its points are exact to {:.3f} mm, to {:.3f} mm "
-        "at the board's worst corner (one standard deviation)\n",
+        "{} is at ({:.2f}, {:.2f}, {:.2f}) mm in the frame of {}; the standard deviation of its points is {:.3f} mm, "
+        "and {:.3f} mm at the board's worst corner\n",
         scanners[i].name, at.x(), at.y(), at.z(), scanners[0].name, one.sigma_mm, one.sigma_far_mm);
-    if (one.places < 2) std::cout << "  from only one place of the board, so nothing checks it: take three\n";
+    if (one.places < 2) std::cout << "  measured at only one place of the board, so nothing checks it: use three\n";
   }
   auto written = write_file_atomically(request.file, file_text(request, scanners, *board, *placed));
   if (written) std::cout << "written to " << request.file.string() << "\n";

@@ -135,7 +135,7 @@ class LiveService {
     if (!answered) return fail(answered.error().code, answered.error().message, socket.string());
     const json& message = answered->reply.message;
     if (message.contains("result") && message["result"].is_object()) return message["result"];
-    return fail(ErrorCode::kMalformed, "the program that answers is not slsd", socket.string());
+    return fail(ErrorCode::kMalformed, "the program at this socket is not slsd", socket.string());
   }
 
   [[nodiscard]] bool opens_devices() const {

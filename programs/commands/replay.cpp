@@ -140,7 +140,7 @@ Result<int> replay(const BundledRecording& recording, const path& folder) {
                              result->dense ? fmt::format(" and {} of pixels", result->dense->points()) : "",
                              !scan.cloud ? "no cloud to compare with"
                              : same      ? "the same cloud, byte for byte"
-                                         : "ANOTHER CLOUD than the bundle's");
+                                         : "DIFFERENT from the bundle's cloud");
     if (folder.empty()) continue;
     Result<> written = write_below(folder, recording.name + "/replayed/" + numbered(number, ".ply"), ply);
     if (written && result->dense) {
@@ -178,7 +178,7 @@ Result<> replay_bundle(const path& file, const path& folder) {
   }
   if (different == 0) return {};
   return fail(ErrorCode::kMismatch,
-              std::to_string(different) + " scan(s) have another result than in the bundle" +
+              std::to_string(different) + " scan(s) differ from the bundle" +
                   (bundle->version == SLSD_VERSION ? "" : ", which slsd wrote in version " + bundle->version),
               file.string());
 }

@@ -74,13 +74,13 @@ Result<> add(Figures& figures, Artefact artefact, const std::string& name, std::
 const char* advice(Artefact artefact) {
   switch (artefact) {
     case Artefact::kPlate:
-      return "put the flat plate elsewhere in the measuring volume, and tilt it otherwise";
+      return "put the flat plate at a new place in the measuring volume, with a new tilt";
     case Artefact::kSphere:
-      return "put the sphere elsewhere in the measuring volume";
+      return "put the sphere at a new place in the measuring volume";
     case Artefact::kBar:
       break;
   }
-  return "put the bar elsewhere in the measuring volume, and turn it otherwise";
+  return "put the bar at a new place in the measuring volume, in a new direction";
 }
 
 /// Scans until the artefact is measured, each time when the user presses Enter.
@@ -96,7 +96,7 @@ Result<> take_place(PlaceScanner& scanner, Artefact artefact, int number, int pl
     if (!std::getline(std::cin, line)) {
       std::cerr << "\n";
       return fail(ErrorCode::kCancelled,
-                  fmt::format("the input ended before {}: the same command goes on from there", name));
+                  fmt::format("the input ended before {}: the same command continues from there", name));
     }
     const auto bytes = scanner.scan();
     if (!bytes) return tl::unexpected(bytes.error());
@@ -156,12 +156,12 @@ std::vector<Quantity> quantities_of(const Figures& figures, double uncertainty_m
   const auto over_sigma = [](const auto& each) { return each.form.error_over_sigma; };
   add("Flatness", "VDI/VDE 2634-2, flatness error", "mm", values_of(figures.plates, range), 0);
   add("Flatness, 95 % of points", "ISO 10360-13, 95 % dispersion", "mm", values_of(figures.plates, range_95), 0);
-  add("Plate: error over sigma", "slsd's stated sigma; 1 is true", "", values_of(figures.plates, over_sigma), 0);
+  add("Plate: error over sigma", "slsd's stated sigma; ideal: 1", "", values_of(figures.plates, over_sigma), 0);
   add("Probing error, form", "VDI/VDE 2634-2, PF", "mm", values_of(figures.spheres, range), 0);
   add("Form, 95 % of points", "ISO 10360-13, 95 % dispersion", "mm", values_of(figures.spheres, range_95), 0);
   add("Probing error, size", "VDI/VDE 2634-2, PS", "mm",
       values_of(figures.spheres, [](const SphereFigures& each) { return each.size_error_mm; }), uncertainty_mm);
-  add("Sphere: error over sigma", "slsd's stated sigma; 1 is true", "", values_of(figures.spheres, over_sigma), 0);
+  add("Sphere: error over sigma", "slsd's stated sigma; ideal: 1", "", values_of(figures.spheres, over_sigma), 0);
   add("Sphere spacing error", "VDI/VDE 2634-2, SD", "mm",
       values_of(figures.bars, [](const BarFigures& each) { return each.spacing_error_mm; }), uncertainty_mm);
   return all;
@@ -177,9 +177,11 @@ DataSheet sheet_of(const DatasheetRequest& request, Figures figures) {
   if (request.spacing_mm > 0) artefacts += fmt::format(", {} mm apart", request.spacing_mm);
   if (!artefacts.empty())
     sheet.facts.push_back(artefacts + fmt::format("; uncertainty (k = 2) {} mm, as given", request.uncertainty_mm));
-  sheet.facts.push_back("The farthest 0.3 % of points are left out. Spheres count up to 60 degrees around their top.");
+  sheet.facts.push_back(
+      "The farthest 0.3 % of points are left out. Of each sphere, the cap within 60 degrees of its top counts.");
   if (figures.plates.size() < 6 || figures.spheres.size() < 10 || figures.bars.size() < 7)
-    sheet.facts.push_back("No acceptance test: the guideline wants 6 places of a plate, 10 of a sphere, 7 of a bar.");
+    sheet.facts.push_back(
+        "Not an acceptance test: the guideline requires 6 places of a plate, 10 of a sphere, 7 of a bar.");
   sheet.places = std::move(figures.lines);
   return sheet;
 }

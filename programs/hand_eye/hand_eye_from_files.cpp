@@ -169,7 +169,7 @@ Result<std::vector<PoseLine>> lines_of(const HandEyeRequest& request) {
   if (!lines) return lines;
   for (const std::string& name : request.without) {
     if (std::erase_if(*lines, [&](const PoseLine& line) { return line.name == name; }) == 0)
-      return fail(ErrorCode::kInvalidArgument, "names no line of poses.csv", "--without " + name);
+      return fail(ErrorCode::kInvalidArgument, "matches no line of poses.csv", "--without " + name);
   }
   return lines;
 }
@@ -232,9 +232,9 @@ std::string result_text(const HandEyeResult& result) {
   const Eigen::Vector3d& place = fit.places.mount_from_rig.translation;
   const bool arm = result.session.mounted == Mounted::kArm;
   return fmt::format(
-      "the robot's poses have a noise of {:.3f} mm and {:.3f}°; the print is {:+.3f} % off its scale\n"
-      "the scanner sits at ({:.2f}, {:.2f}, {:.2f}) mm {}, exact to {:.2f} mm and {:.3f}° (one standard deviation)\n"
-      "{}: 95 % of points at {:.0f} mm are placed to {:.2f} mm\n",
+      "the robot's poses have a noise of {:.3f} mm and {:.3f}°; the print's scale is {:+.3f} % off\nthe scanner is at "
+      "({:.2f}, {:.2f}, {:.2f}) mm {}, to {:.2f} mm and {:.3f}° (one standard deviation)\n{}: 95 % of points at {:.0f} "
+      "mm are placed within {:.2f} mm\n",
       fit.noise.place_mm, degrees_of(fit.noise.turn_rad), 100 * fit.shared[SharedErrors::kPrintScale], place.x(),
       place.y(), place.z(), arm ? "from the flange" : "from the robot's base", result.verdict.place_sigma_mm,
       degrees_of(result.verdict.turn_sigma_rad), to_string(grade(result.verdict)), result.verdict.distance_mm,
@@ -279,7 +279,7 @@ Proposal propose(const HandEyeResult& result, const HandEyeRecord& record, const
   if (!next) return {};
   Proposal proposal{{}, robot_numbers(next->base_from_flange, record.notation)};
   for (double& number : proposal.numbers) number = rounded(number, kNumbersPerUnit);
-  proposal.text = fmt::format("next pose: {}, to {:.10g}; then points are placed to about {:.2f} mm",
+  proposal.text = fmt::format("next pose: {}, to {:.10g}; then points are placed within about {:.2f} mm",
                               describe(*next, result.session), fmt::join(proposal.numbers, ", "), next->error_mm);
   return proposal;
 }

@@ -83,8 +83,8 @@ Result<FlashPixels> FlashPixels::find(const Samples& dark, const Samples& dark_a
   const double noise = std::abs(brightest_difference(dark, dark_again));
   if (flash < kAboveNoise * noise + 1) {
     return fail(ErrorCode::kNotFound,
-                "the camera saw no flash: point it at what the projector lights, take the caps off, darken the room, "
-                "and allow a longer exposure");
+                "the camera saw no flash: point it at the projected area, take the lens caps off, darken the room, and "
+                "allow a longer exposure");
   }
   FlashPixels pixels;
   const double highest = *std::ranges::max_element(lit);

@@ -20,8 +20,7 @@ namespace {
 using std::filesystem::path;
 
 constexpr std::size_t kMaxFileBytes = 1 << 20;
-constexpr const char* kWhenInForce =
-    "A running service takes it with systemctl reload slsd; a stopped one at its next start";
+constexpr const char* kWhenInForce = "If slsd is running, run systemctl reload slsd to use this calibration";
 
 path uncorrected(path file) {
   file += ".uncorrected";
@@ -73,7 +72,7 @@ Result<> keep_correction(const Verifier& verifier, const path& file) {
   correction->calibration.report.corrected = fmt::format("{}{} {}", earlier ? *earlier + "; " : "",
                                                          utc_text(std::chrono::system_clock::now()), correction->drift);
   if (auto written = write_file_atomically(file, write_calibration(correction->calibration)); !written) return written;
-  std::cout << fmt::format("corrected {}; slsd --correct --undo brings back {}. {}\n", file.string(),
+  std::cout << fmt::format("corrected {}; slsd --correct --undo restores {}. {}\n", file.string(),
                            uncorrected(file).string(), kWhenInForce);
   return {};
 }
@@ -92,7 +91,7 @@ Result<> undo_correction(const std::optional<path>& configuration_file) {
   const auto before = read(uncorrected(file));
   if (!before) return tl::unexpected(before.error());
   if (before->calibration.report.date != now->calibration.report.date) {
-    return fail(ErrorCode::kMismatch, "is of another date than the calibration in force: nothing was changed",
+    return fail(ErrorCode::kMismatch, "differs in date from the calibration in force: nothing was changed",
                 uncorrected(file).string());
   }
   if (auto written = write_file_atomically(file, before->text); !written) return written;

@@ -124,7 +124,7 @@ Result<> Verifier::look(const std::string& pose, const std::string& camera, cons
   if (known == nullptr) return fail(ErrorCode::kNotFound, "the calibration has no camera of this name", camera);
   if (auto fits = check_size(pictures, *known, name); !fits) return fits;
   if (needs_board_ && size_of(pictures.white) == ImageSize{}) {
-    return fail(ErrorCode::kNotFound, "has no white.png, in which a correction finds the board", name);
+    return fail(ErrorCode::kNotFound, "has no white.png, and a correction finds the board only in that picture", name);
   }
   std::string remark;
   const auto index = static_cast<std::size_t>(known - calibration_.cameras.data());
@@ -147,7 +147,7 @@ Result<> Verifier::look(const std::string& pose, const std::string& camera, cons
 }
 
 Result<Correction> Verifier::find_correction() const {
-  if (looks_.poses.empty()) return fail(ErrorCode::kNotFound, "a correction needs a look at the board");
+  if (looks_.poses.empty()) return fail(ErrorCode::kNotFound, "a correction needs a view of the board");
   return correct_calibration(looks_, board_, calibration_, correct_options_);
 }
 
@@ -164,7 +164,7 @@ void Verifier::check_again(const Calibration& calibration) const {
 std::string Verifier::offer() const {
   const auto correction = find_correction();
   if (!correction || !correction->needed) return {};
-  return fmt::format(". Or repair it from this look with slsd --correct: {}", correction->drift);
+  return fmt::format(". Or repair it from this view with slsd --correct: {}", correction->drift);
 }
 
 Result<> Verifier::finish() const {

@@ -308,7 +308,7 @@ class Bundle(unittest.TestCase):
         # A picture of 4 gigapixels in 70 bytes, and one of another camera.
         bomb = bytes.fromhex("89504e470d0a1a0a0000000d49484452") + b"\0\1\0\0\0\1\0\0\10\0\0\0\0" + bytes(40)
         self.refused({**files, "recording-1/camera/00000000.png": bomb}, "recording-1")
-        self.refused({**files, "recording-1/camera/00000000.png": b"P5 8 8 255\n" + bytes(64)}, "another result")
+        self.refused({**files, "recording-1/camera/00000000.png": b"P5 8 8 255\n" + bytes(64)}, "differ from the bundle")
         lines = files["recording-1/scans.jsonl"].replace(b'"camera":"camera"', b'"camera":"other"')
         self.refused({**files, "recording-1/scans.jsonl": lines}, "order of the cameras")
         lines = files["recording-1/scans.jsonl"].replace(b"camera/00000000.png", b"../../../etc/passwd")
@@ -320,7 +320,7 @@ class Bundle(unittest.TestCase):
             lines = files["recording-1/scans.jsonl"].replace(b'"density"', f'"part":{part},"density"'.encode())
             self.refused({**files, "recording-1/scans.jsonl": lines}, said)
         other = files["recording-1/clouds/00000000.ply"][:-1] + b"\x7f"
-        self.refused({**files, "recording-1/clouds/00000000.ply": other}, "another result than in the bundle")
+        self.refused({**files, "recording-1/clouds/00000000.ply": other}, "differ from the bundle")
         self.assertEqual(replay(self.folder).returncode, 1)
         self.assertEqual(replay(self.folder / "none").returncode, 1)
         self.assertEqual(os.listdir(self.folder), ["bundle.tar"])

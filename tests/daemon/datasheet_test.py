@@ -135,8 +135,8 @@ class Datasheet(unittest.TestCase):
             words = [BIN / "slsctl", "--socket", str(service.socket), "datasheet", str(self.folder), "--plate", "2", "--note", "20.5 degrees"]
             done = subprocess.run(words, input="\n", capture_output=True, text=True, timeout=600)
             self.assertEqual(done.returncode, 1, done.stderr)
-            self.assertIn("plate, place 1 of 2: put the flat plate elsewhere", done.stderr)
-            self.assertIn("the input ended before plate-02.ply: the same command goes on from there", done.stderr)
+            self.assertIn("plate, place 1 of 2: put the flat plate at a new place", done.stderr)
+            self.assertIn("the input ended before plate-02.ply: the same command continues from there", done.stderr)
             self.assertFalse((self.folder / "datasheet.pdf").exists())
             done = subprocess.run(words, input="\n", capture_output=True, text=True, timeout=600)  # the second place
             self.assertEqual(done.returncode, 0, done.stderr)

@@ -59,14 +59,14 @@ CaptureFiles list_files(const path& folder, WhitePicture white) {
     if (file.filename().string().starts_with("gray_") && is_picture(file)) files.gray.push_back(file);
   }
   if (files.white.empty() && !(white == WhitePicture::kOptional && !files.pattern.empty())) {
-    files.lack =
-        lacking(std::string("is missing: the board under the white projector; ") + kLayout, folder / "white.png");
+    files.lack = lacking(std::string("is missing: a picture of the board in the projector's white light; ") + kLayout,
+                         folder / "white.png");
   } else if (files.pattern.empty() && files.gray.empty()) {
     files.lack =
         lacking(std::string("lacks a projected image: neither pattern.png nor gray_00.png; ") + kLayout, folder);
   } else if (files.pattern.empty() && files.black.empty()) {
-    files.lack =
-        lacking("is missing: a Gray code also needs the board under the black projector", folder / "black.png");
+    files.lack = lacking("is missing: a Gray code also needs a picture of the board while the projector shows black",
+                         folder / "black.png");
   }
   return files;
 }

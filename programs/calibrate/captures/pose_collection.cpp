@@ -96,7 +96,7 @@ std::string PoseCollection::most_helpful() const {
        {missing_tilt(), missing_place(kCoverageEnough), missing_distance(), missing_place(1)}) {
     if (!missing.empty()) return missing;
   }
-  return "any pose unlike the others";
+  return "any pose that differs from the others";
 }
 
 /// The advice to tilt the board to the rarest side; empty if half of the poses are tilted.
@@ -140,8 +140,8 @@ std::string PoseCollection::missing_distance() const {
 }
 
 std::string PoseCollection::next_place_of_plane() const {
-  static constexpr std::array kPlaces{"near, where you scan nearest", "in the middle of where you scan",
-                                      "far, where you scan farthest"};
+  static constexpr std::array kPlaces{"at your nearest scanning distance", "in the middle of your scanning range",
+                                      "at your farthest scanning distance"};
   return fmt::format("hold the reference plane {}, facing the camera", kPlaces[places_.size() % kPlaces.size()]);
 }
 

@@ -35,7 +35,7 @@ Result<CapturedPictures> load(const CaptureFiles& files, bool gray_code) {
     if (size == ImageSize{}) size = own;
     if (own == size) return {};
     return fail(ErrorCode::kMismatch,
-                fmt::format("has {} pixels, the pictures before it {}: take all with one camera in one mode",
+                fmt::format("has {} pixels, but the pictures before it have {}: take all with one camera in one mode",
                             size_text(own), size_text(size)),
                 file.string());
   };
@@ -72,7 +72,7 @@ class CaptureReader {
     for (const auto& [folder, files] : pose.cameras) {
       const auto at = folder.empty() ? names_.begin() : std::ranges::find(names_, folder);
       if (at == names_.end()) {
-        return fail(ErrorCode::kNotFound, "belongs to no camera", files.white.parent_path().string());
+        return fail(ErrorCode::kNotFound, "matches no configured camera", files.white.parent_path().string());
       }
       const auto camera = static_cast<std::size_t>(at - names_.begin());
       auto view = look(pose, camera, files);
@@ -163,9 +163,9 @@ class CaptureReader {
       const std::string& name = look.first;
       const std::size_t camera = look.second;
       if (own == cameras[camera].size) continue;
-      const std::string reason =
-          fmt::format("its pictures have {} pixels, those of the other poses {}: take all with one camera in one mode",
-                      size_text(own), size_text(cameras[camera].size));
+      const std::string reason = fmt::format(
+          "its pictures have {} pixels, but those of the other poses have {}: take all with one camera in one mode",
+          size_text(own), size_text(cameras[camera].size));
       const auto at = std::ranges::find(captures.observations.poses, name, &PoseObservation::name);
       const bool taken = at != captures.observations.poses.end();
       if (taken) std::erase_if(at->views, [&](const PoseView& view) { return view.camera == camera; });
@@ -189,7 +189,7 @@ class CaptureReader {
         if (!pattern) continue;
         if (!observers_.of(doubt.subject).print_shift(view(*white), view(*pattern)).certain()) continue;
         const std::string reason = fmt::format(
-            "its pattern's picture belongs to another pose, and {} has its own: swap them back", other.pose);
+            "its pattern picture belongs to another pose, and {} has the one of this pose: swap them back", other.pose);
         rule_out(doubt.pose, PoseFault::kSwapped, reason);
       }
     }
@@ -206,10 +206,9 @@ class CaptureReader {
         if (other.pose == doubt.pose || other.camera != doubt.camera || !pattern) continue;
         const auto white = read_image(other.files->white);
         if (!white || !observers_.of(doubt.subject).print_shift(view(*white), view(*pattern)).certain()) continue;
-        rule_out(
-            doubt.pose, PoseFault::kSwapped,
-            fmt::format("its pattern's picture is a copy of the one of {}, or was taken with it: take the pose again",
-                        other.pose));
+        rule_out(doubt.pose, PoseFault::kSwapped,
+                 fmt::format("its pattern picture copies that of {}, or shows the same pose: take the pose again",
+                             other.pose));
         break;
       }
     }

@@ -94,7 +94,7 @@ std::string planes_of(const CalibrationOutcome& outcome) {
   std::string html =
       "<h2>Reference plane</h2>\n<p>Before and after the second step, which uses the plane. Off: symbols off the "
       "plane, in mm; noise: what their noise explains. Distances between markers, in per cent: scale, and long "
-      "distances.</p>\n<div class='wide'><table>\n<tr><th>look</th><th colspan='4'>before</th><th "
+      "distances.</p>\n<div class='wide'><table>\n<tr><th>view</th><th colspan='4'>before</th><th "
       "colspan='4'>after</th></tr>\n<tr><th></th>";
   for (int i = 0; i < 2; ++i) html += "<th>off</th><th>noise</th><th>scale</th><th>long</th>";
   html += "</tr>\n";
@@ -112,7 +112,7 @@ std::string image_figures(const CalibrationOutcome& outcome) {
     coverage += camera_coverage_figure(outcome, i);
     residuals += camera_residual_figure(outcome, i);
   }
-  return "<h2>What the poses cover</h2>\n" + coverage + projector_coverage_figure(outcome) +
+  return "<h2>Coverage</h2>\n" + coverage + projector_coverage_figure(outcome) +
          "<h2>Residuals</h2>\n<p>The error of each point. Arrows should point in random directions: if neighbours "
          "agree, the lens model does not fit.</p>\n" +
          residuals + projector_residual_figure(outcome);
@@ -157,8 +157,7 @@ std::string poses_of(const CalibrationOutcome& outcome) {
   }
   return fmt::format(
              "<h2>Poses</h2>\n<p>{} were used; {} are good. Errors are root mean square, in the camera. Held out: "
-             "calibrated from the other poses. Outliers lie far from where all others put them, and were left "
-             "out.</p>\n",
+             "calibrated from the other poses. Outliers disagree with all other points, and were left out.</p>\n",
              used, kPosesGood) +
          table_of(html);
 }

@@ -114,7 +114,7 @@ TEST_F(HandEyeFromFiles, RefusesTooFewPoses) {
   request_.without = {"pose_99"};
   const auto unknown = hand_eye_from_files(request_);
   ASSERT_FALSE(unknown);
-  EXPECT_THAT(to_string(unknown.error()), HasSubstr("--without pose_99: names no line"));
+  EXPECT_THAT(to_string(unknown.error()), HasSubstr("--without pose_99: matches no line"));
 }
 
 TEST_F(HandEyeFromFiles, RefusesAPoseWithoutACapture) {
