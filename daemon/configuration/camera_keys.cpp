@@ -175,8 +175,8 @@ Result<std::vector<CameraOptions>> read_cameras(const std::vector<const toml::ta
   }
   if (!cameras.empty() && std::ranges::none_of(cameras, &CameraOptions::measures)) {
     return fail(ErrorCode::kInvalidArgument,
-                "[[camera]] use = \"texture\" gives colours to the points of another camera: add one that measures "
-                "them, or leave the key out",
+                "[[camera]] use = \"texture\" only gives colours to the points of another camera: add a camera that "
+                "measures, or remove the key",
                 place_of(tables.front()->get("use")->source(), file.string()));
   }
   std::stable_partition(cameras.begin(), cameras.end(), [](const CameraOptions& camera) { return camera.measures(); });

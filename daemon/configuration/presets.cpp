@@ -56,7 +56,7 @@ Result<> check_preset_name(std::string_view name) {
   if (plain) return {};
   return fail(ErrorCode::kInvalidArgument,
               "\"" + printable(name, kNameMax) +
-                  "\" is no name for a preset: use 1 to 64 letters, digits, dots, dashes and underscores");
+                  "\" is not a valid preset name: use 1 to 64 letters, digits, dots, dashes and underscores");
 }
 
 Result<json> with_preset(json presets, const std::string& name, json settings, const std::string& now) {

@@ -243,18 +243,17 @@ Result<> ScanSetup::check(const ScanRequest& request) const {
   if (auto part = part_of(request); !part) return tl::unexpected(part.error());
   if (auto known = check_camera(request.camera); !known) return known;
   if (camera_index(request.camera) < measuring_cameras()) return {};
-  return fail(
-      ErrorCode::kInvalidArgument,
-      "camera \"" + printable(request.camera, 64) +
-          "\" serves for colour alone (use = \"texture\"), and decodes no picture: name another, or ask for its "
-          "frame",
-      "camera");
+  return fail(ErrorCode::kInvalidArgument,
+              "camera \"" + printable(request.camera, 64) +
+                  "\" is only for colour (use = \"texture\"), so slsd decodes none of its frames: name another camera, "
+                  "or request its frame",
+              "camera");
 }
 
 Result<> ScanSetup::check_robot_base() const {
   if (!hand_eye) {
     return fail(ErrorCode::kNotFound,
-                "the scanner's place in the robot's base is unknown: run slsctl hand-eye, and set [frame] hand_eye");
+                "the scanner's pose in the robot's base is unknown: run slsctl hand-eye, and set [frame] hand_eye");
   }
   const std::string now = calibration ? calibration->report.date.value_or("") : "";
   if (now.empty() || hand_eye->calibration_date.empty() || now == hand_eye->calibration_date) return {};

@@ -269,8 +269,7 @@ void Service::on_reloaded(const Result<Configuration>& configuration, nlohmann::
   const std::filesystem::path kept = kept_settings_file(state_.configuration_file);
   nlohmann::json why_not_kept;
   state_.settings = std::move(settings);
-  if (changed && kept.empty())
-    why_not_kept = "$STATE_DIRECTORY is not set, so the next start will not have this setting";
+  if (changed && kept.empty()) why_not_kept = "$STATE_DIRECTORY is not set: start the service with its systemd unit";
   if (changed && !kept.empty()) {
     if (auto written = write_file_atomically(kept, state_.settings.dump(2) + "\n"); !written) {
       why_not_kept = to_string(written.error());

@@ -271,7 +271,7 @@ socket = "slsd.sock"
         self.assertIn('use = "texture"', self.refused(client, INVALID_ARGUMENT, camera="texture", picture=True))
         with self.assertRaises(RpcError) as raised:
             client.call("preview", camera="texture")
-        self.assertIn("ask for its frame", str(raised.exception))
+        self.assertIn("request its frame", str(raised.exception))
         self.assertEqual(client.call("frame", camera="texture")[0]["width_px"], WIDTH)
         self.assertGreater(client.call("scan", texture=True)[0]["points"], 1000)  # without its white frame
         with self.assertRaises(RpcError) as raised:
@@ -317,11 +317,11 @@ socket = "slsd.sock"
     def test_what_has_no_colour_is_refused(self):
         self.record("white", self.picture[:, :, 1])
         service, client = self.serve()
-        self.assertIn("no camera gives colours", self.refused(client, UNSUPPORTED, colour=True))
+        self.assertIn("no camera sends colour", self.refused(client, UNSUPPORTED, colour=True))
         self.assertIn("leave out", self.refused(client, INVALID_PARAMS, colour=True, texture=False))
         refused = slsctl("--socket", service.socket, "scan", "--colour")
         self.assertNotEqual(refused.returncode, 0)
-        self.assertIn("no camera gives colours", refused.stderr)
+        self.assertIn("no camera sends colour", refused.stderr)
         self.assertGreater(client.call("scan", texture=True)[0]["points"], 1000)
 
 

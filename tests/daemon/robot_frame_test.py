@@ -218,7 +218,7 @@ class RobotFrame(unittest.TestCase):
 
     def test_box_in_the_robots_base_needs_its_place(self):
         with Service() as service, service.client() as client:
-            self.refused(client, "the scanner's place in the robot's base is unknown", box=[0, 0, 0, 1, 1, 1], box_frame="robot_base")
+            self.refused(client, "the scanner's pose in the robot's base is unknown", box=[0, 0, 0, 1, 1, 1], box_frame="robot_base")
 
     def test_slsctl(self):
         pose = ",".join(map(str, POSE_UR))

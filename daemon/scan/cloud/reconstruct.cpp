@@ -212,7 +212,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   if (request.colour && !sees_colours)
     return fail(
         ErrorCode::kUnsupported,
-        "no camera gives colours: configure a format with colours, as \"BayerRG8\" or \"YUYV\", or scan without them");
+        "no camera sends colour: configure a colour format, such as \"BayerRG8\" or \"YUYV\", or scan without colour");
   result.cloud.coloured = request.colour;
   if (dense) {
     const auto dense_begin = steady_clock::now();
@@ -239,8 +239,9 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
   textures->paint(result);
   result.decode_time += steady_clock::now() - paint_begin;
   if (decoded > 0 && result.cloud.points.empty())
-    result.empty = "none of the " + std::to_string(decoded) + " points lies " +
-                   (part.box ? "within the box: make it larger, or move it" : "before the plane: move it, or turn it");
+    result.empty =
+        "none of the " + std::to_string(decoded) + " points lies " +
+        (part.box ? "within the box: make it larger, or move it" : "in front of the plane: move it, or turn it");
   if (auto kept = keep_frames(set, setup, request.frames, result); !kept) return tl::unexpected(kept.error());
   return result;
 }

@@ -28,7 +28,7 @@ Result<> add_colours(const FrameSet& set, const ScanSetup& setup, std::size_t ca
     if (!converted) return tl::unexpected(std::move(converted.error()));
     colours = std::move(*converted);
     if (colours.empty() || size_of(frames[camera].image()) == std::pair(colours.width(), colours.height())) return {};
-    return fail(ErrorCode::kMismatch, "the colours of a frame have another size than the frame: scan again");
+    return fail(ErrorCode::kMismatch, "a frame and its colours differ in size: scan again");
   };
   auto added = read(set.white, seen.white);
   if (added) added = read(set.dark, seen.dark);

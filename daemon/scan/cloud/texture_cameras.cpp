@@ -18,15 +18,15 @@ Result<TextureCameras> TextureCameras::of(const FrameSet& set, const ScanSetup& 
       return tl::unexpected(std::move(read.error()));
     if (camera.seen->light.white_colours == nullptr) {
       return fail(ErrorCode::kUnsupported,
-                  "serves for colour alone (use = \"texture\"), but its frames have none: configure a format with "
-                  "colours, as \"BayerRG8\" or \"YUYV\", or scan without them",
+                  "is only for colour (use = \"texture\"), but its frames have none: configure a colour format, such "
+                  "as \"BayerRG8\" or \"YUYV\", or scan without colour",
                   "camera " + name);
     }
     const Lens& lens = camera.calibrated.lens;
     if (std::pair(camera.seen->white.width(), camera.seen->white.height()) !=
         std::pair(lens.width_px, lens.height_px)) {
       return fail(ErrorCode::kMismatch,
-                  "its frames have another size than its calibration: calibrate again, or configure that size",
+                  "its frames differ in size from its calibration: calibrate again, or configure that size",
                   "camera " + name);
     }
     textures.of_symbols_.emplace_back(camera.calibrated, camera.seen->light);

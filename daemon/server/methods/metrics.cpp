@@ -15,7 +15,7 @@ void tell_service(const ServiceState& state, Exposition& out) {
   const auto uptime = std::chrono::duration<double>(std::chrono::steady_clock::now() - state.started);
   out.family("slsd_build", "gauge", "Always 1; its label has the version of the service.");
   out.sample(1, {{"version", SLSD_VERSION}});
-  out.one("slsd_uptime_seconds", "gauge", "How long the service has been running.", uptime.count(), "seconds");
+  out.one("slsd_uptime_seconds", "gauge", "Time since the service started.", uptime.count(), "seconds");
   out.one("slsd_ready", "gauge", "1 if all devices are open and there is a calibration.", is_ready(state) ? 1 : 0);
   out.one("slsd_resident_bytes", "gauge", "Resident memory of the service.", static_cast<double>(resident_bytes()),
           "bytes");
@@ -105,7 +105,7 @@ void tell_cameras(const ServiceState& state, Exposition& out) {
       out.sample(value_of(drifts[i]), {{"camera", cameras[i].name}});
   };
   drift(
-      "slsd_camera_epipolar_px", "How far the points of recent scans lie off their epipolar lines.",
+      "slsd_camera_epipolar_px", "Distance of recent scans' points from their epipolar lines.",
       [](const DriftState& of) { return of.epipolar_px; }, "px");
   drift(
       "slsd_camera_epipolar_limit_px",
@@ -132,8 +132,8 @@ void tell_scans(const ServiceState& state, Exposition& out) {
   out.family("slsd_scans_failed", "counter", "Scans that failed, by the error's name.");
   for (const auto& [code, failed] : totals.failed)
     out.sample(static_cast<double>(failed), {{"error", to_string(code)}});
-  count("slsd_scans_skipped", "Sets of frames that were not decoded because newer ones came.", totals.skipped);
-  count("slsd_scan_tries_lost", "Tries that lost their frames, in scans that succeeded later.", totals.lost_tries);
+  count("slsd_scans_skipped", "Sets of frames that were not decoded because newer ones arrived.", totals.skipped);
+  count("slsd_scan_tries_lost", "Attempts that lost their frames, in scans that later succeeded.", totals.lost_tries);
   count("slsd_points", "Symbol points in all clouds.", totals.all_points);
   out.one("slsd_points_of_last_scan", "gauge", "Symbol points in the last cloud.", static_cast<double>(totals.points));
   out.family("slsd_regions", "counter", "Regions of all frames, by status: decoded, or the reason for rejection.");

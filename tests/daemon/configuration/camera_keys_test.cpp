@@ -84,7 +84,7 @@ TEST(ReadConfiguration, PutsTextureCamerasLast) {
   EXPECT_EQ(names(with("use = \"texture\"\n", "use = \"points\"\n")), "b c a texture ");
   EXPECT_EQ(names(with("use = \"texture\"\n", "use = \"texture\"\n")), "c a texture b texture ");
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nuse = \"colour\"\n"), HasSubstr("points, texture"));
-  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nuse = \"texture\"\n"), HasSubstr("add one that measures them"));
+  EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\nuse = \"texture\"\n"), HasSubstr("add a camera that measures"));
   EXPECT_THAT(error_of("[[camera]]\npath = \"x\"\n[[camera]]\nname = \"t\"\npath = \"x\"\nuse = \"texture\"\n"
                        "exposures_us = [2000, 8000]\n"),
               HasSubstr("set exposure_us"));
