@@ -270,7 +270,9 @@ class Running : public Bridge {
         state.worse(Level::kWarn, "the last cloud is empty: " + why.get<std::string>());
       if (calibration_text_.empty()) state.worse(Level::kError, "not calibrated");
       if (stale_)
-        state.worse(Level::kError, "extrinsics_stale: the scanner was calibrated again since; measure where it stands");
+        state.worse(
+            Level::kError,
+            "extrinsics_stale: the scanner was recalibrated since: measure its pose again with slsd --extrinsics");
       if (const std::string why = not_placed(); !why.empty())
         state.worse(Level::kError, "the last cloud is not published: " + why);
       publish_images(scanner);

@@ -95,7 +95,7 @@ struct Source {
     if (extrinsics.calibration_date.empty()) return {};
     if (!calibration_date) return "extrinsics_unknown: its diagnostics lack the calibration date";
     if (*calibration_date != extrinsics.calibration_date)
-      return "extrinsics_stale: the scanner was calibrated again since; measure where it stands";
+      return "extrinsics_stale: the scanner was recalibrated since: measure its pose again with slsd --extrinsics";
     return {};
   }
 };

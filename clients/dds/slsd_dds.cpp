@@ -69,18 +69,19 @@ void add_scanner_options(CLI::App& app, slsd::dds::BridgeOptions& options) {
   app.add_option("--extrinsics", options.extrinsics, "the TOML file with the poses of the scanners");
   app.add_flag_callback(
       "--no-transforms", [&options] { options.transforms = false; },
-      "do not publish /tf_static; a robot description has the frames");
+      "do not publish /tf_static, because a robot description has the frames");
 }
 
 void add_robot_options(CLI::App& app, slsd::dds::RobotFrames& robot, bool& prints_pose) {
-  app.add_option("--robot-base", robot.base, "the frame of clouds in the robot's base (base_link)")->type_name("FRAME");
+  app.add_option("--robot-base", robot.base, "the tf frame of the robot's base, for clouds in it (base_link)")
+      ->type_name("FRAME");
   auto* flange =
       app.add_option(
              "--flange", robot.flange,
-             "the frame in tf of the flange that carries the scanner, such as tool0: puts clouds into --robot-base")
+             "the tf frame of the flange that carries the scanner, such as tool0; clouds are then in --robot-base")
           ->type_name("FRAME");
   app.add_flag("--print-pose", prints_pose,
-               "print the pose of --flange in --robot-base as ROS has it, once it stands still, and exit")
+               "wait until --flange stands still in --robot-base, print its pose in ROS's notation, and exit")
       ->needs(flange);
 }
 
@@ -120,7 +121,7 @@ int main(int argc, char** argv) {
   slsd::dds::NetworkOptions network;
   app.set_version_flag("--version", "slsd-dds " SLSD_VERSION);
   auto* name = app.add_option("--name", options.name,
-                              "the scanner's name, with which its topics begin (scanner; with --merge: merged)");
+                              "the scanner's name, the first part of its topics (scanner; with --merge: merged)");
   add_scanner_options(app, options);
   bool prints_pose = false;
   slsd::dds::RobotFrames robot;

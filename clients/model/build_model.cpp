@@ -132,8 +132,8 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell, const Adv
   const std::size_t lost = report.refused.size();
   std::vector<ModelFrame>& frames = tracker_.frames();
   if (frames.empty())
-    return fail(ErrorCode::kMalformed, report.refused.empty() ? "no cloud came"
-                                                              : "no frame can be used: " + report.refused.front().name +
+    return fail(ErrorCode::kMalformed, report.refused.empty() ? "no cloud arrived"
+                                                              : "no frame is usable: " + report.refused.front().name +
                                                                     ": " + report.refused.front().reason);
   if (advance) advance(0, 0);
   tracker_.mark_foreign_cells();

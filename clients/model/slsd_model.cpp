@@ -71,11 +71,11 @@ std::string to_text(const model::ModelReport& report, const Mesh& mesh) {
                   report.fused.size(), report.frames, report.turned_degrees, adjustment.over_sigma, adjustment.links);
   text += adjustment.closed ? fmt::format("closed: {:.3f} mm of drift before, {:.3f} mm of seam after\n",
                                           adjustment.drift_mm, adjustment.seam_mm)
-                            : "not closed: no frame at the end shows what one at the beginning shows\n";
+                            : "not closed: the last frames do not overlap the first ones\n";
   if (report.invented_share > 0)
-    text += fmt::format("invented to close it: {:.1f} % of the surface, where PLY has frames 0\n",
+    text += fmt::format("invented to close the holes: {:.1f} % of the surface, with frames = 0 in the PLY\n",
                         100 * report.invented_share);
-  return text + fmt::format("mesh: {} triangles, usual sigma {:.3f} mm, voxels of {:.2f} mm\n", mesh.triangles.size(),
+  return text + fmt::format("mesh: {} triangles, median sigma {:.3f} mm, voxels of {:.2f} mm\n", mesh.triangles.size(),
                             report.usual_sigma_mm, report.voxel_mm);
 }
 
@@ -194,7 +194,7 @@ int run_live(const Options& options, model::Progress& progress) {
   const Result<> ended = session.follow();
   if (!ended) {
     if (session.placed() == 0) return progress.fail(ended.error());
-    progress.say(to_string(ended.error()) + "; the model is of the clouds before that");
+    progress.say(to_string(ended.error()) + "; the model is built from the clouds before that");
   }
   const auto advance = [&progress](std::size_t done, std::size_t all) { progress.build(done, all); };
   const int status = deliver(options, session.finish(advance), "clouds of the scanner", progress, &session.clouds());
@@ -221,7 +221,7 @@ void check(const Options& options) {
   if (options.outputs.empty() || !std::ranges::all_of(options.outputs, is_mesh))
     throw CLI::ValidationError("--output", "the file's name ends in .ply, .stl, .obj, .glb or .3mf");
   if (options.turntable && options.live.views == 0)
-    throw CLI::ValidationError("--turntable", "say how many views a full turn has: --views 24");
+    throw CLI::ValidationError("--turntable", "give the number of views in a full turn, such as --views 24");
   const std::vector<float>& box = options.box_mm;
   for (std::size_t axis = 0; axis < 3 && !box.empty(); ++axis)
     if (!(box[axis] < box[axis + 3]))
@@ -232,43 +232,44 @@ void check(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Fuses the clouds of an object that turns in front of the scanner into one mesh.\n"
-      "Exit status: 0 done, 1 no model or a session that failed, 2 wrong usage.",
+      "Fuses the clouds of an object that turns in front of the scanner into one mesh.\nExit status: 0 done, 1 no "
+      "model or the session failed, 2 wrong usage.",
       "slsd-model");
   Options options;
   app.set_version_flag("--version", "slsd-model " SLSD_VERSION);
-  app.add_option("-o,--output", options.outputs,
-                 "the mesh: .ply, .stl, .obj, .glb or .3mf; several for several formats")
+  app.add_option("-o,--output", options.outputs, "the mesh to write: .ply, .stl, .obj, .glb or .3mf; may be repeated")
       ->allow_extra_args(false);
-  auto* const from =
-      app.add_option("--from", options.recording, "the folder of a recording of slsctl that has clouds; else scan now");
+  auto* const from = app.add_option("--from", options.recording,
+                                    "use the clouds of this recording (slsctl record --clouds) instead of scanning");
   const auto live = [&](CLI::Option* option) { return option->excludes(from); };
   live(app.add_option("--socket", options.socket,
                       "the service's socket; default: SLSD_SOCKET if set (" + options.socket.string() + ")"));
-  auto* const turntable =
-      live(app.add_flag("--turntable", options.turntable, "scan a view at each line of the standard input, as Enter"));
-  live(app.add_option("--views", options.live.views, "with --turntable: views of a full turn"))
+  auto* const turntable = live(
+      app.add_flag("--turntable", options.turntable, "scan one view for each line on standard input, such as Enter"));
+  live(app.add_option("--views", options.live.views, "with --turntable: the number of views in a full turn"))
       ->check(between(8, 360))
       ->needs(turntable);
-  live(app.add_flag("--colour", options.colour, "with --turntable: the mesh shows the colour of the surface"))
+  live(app.add_flag("--colour", options.colour, "with --turntable: give the mesh the surface's colours"))
       ->needs(turntable);
-  live(app.add_flag("--until-closed", options.live.until_closed, "end when the object was seen from all sides"))
+  live(app.add_flag("--until-closed", options.live.until_closed,
+                    "end when the scanner has seen the object from all sides"))
       ->excludes(turntable);
-  live(app.add_option("--seconds", options.live.seconds, "end after so many seconds"))
+  live(app.add_option("--seconds", options.live.seconds, "end after this many seconds"))
       ->check(between(0.1, 86400.0))
       ->excludes(turntable);
   live(app.add_option("--keep", options.keep, "keep the clouds in this new folder, for --from"));
-  app.add_option("--box", options.box_mm, "use points in this box alone: least x y z, greatest x y z, mm of the rig")
+  app.add_option("--box", options.box_mm,
+                 "use only points in this box: least x y z, then greatest x y z, in mm in the rig's frame")
       ->expected(6);
   app.add_option("--background", options.background,
-                 "leave out what this dense cloud (PLY) of the scene without the object shows, as table and wall");
-  app.add_option("--voxel", options.model.voxel_mm, "the mesh's resolution in mm (by the clouds' pixels and sigmas)")
+                 "leave out the surfaces in this dense cloud (PLY) of the empty scene, such as table and wall");
+  app.add_option("--voxel", options.model.voxel_mm, "the mesh's resolution in mm (from the clouds' pixels and sigmas)")
       ->check(between(0.01, 100.0));
   app.add_flag("--close", options.model.close,
-               "close the holes, as for printing: invent surface where none was measured");
-  app.add_option("--preview", options.preview, "write points of the growing model into this file, a PLY");
+               "close the holes for 3D printing: invents surface where none was measured");
+  app.add_option("--preview", options.preview, "write points of the growing model to this PLY file");
   auto* const json = app.add_flag("--json", options.json, "print the report as JSON");
-  app.add_flag("--progress", options.progress, "print lines of JSON: the progress, then the report")->excludes(json);
+  app.add_flag("--progress", options.progress, "print progress and then the report, as lines of JSON")->excludes(json);
   if (const auto ended = parse_usage(app, argc, argv, [&options] { check(options); })) return *ended;
   return run(options);
 }

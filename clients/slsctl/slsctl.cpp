@@ -49,13 +49,15 @@ void add_density(CLI::App* command, ClientOptions& options) {
 
 /// Adds the options that choose a part of the scene.
 void add_part(CLI::App* command, ClientOptions& options) {
-  command->add_option("--box", options.box, "measure within this box alone: the least and the other corner, in mm")
+  command->add_option("--box", options.box, "measure only within this box: its least and its greatest corner, in mm")
       ->delimiter(',')
       ->expected(6)
       ->type_name("X,Y,Z,X,Y,Z");
   command->add_option("--box-frame", options.box_frame, "the frame of the box (as configured)")
       ->check(one_of({"rig", "robot_base"}));
-  command->add_option("--voxel-mm", options.voxel_mm, "keep one point, the most certain, of each cube of this side")
+  command
+      ->add_option("--voxel-mm", options.voxel_mm,
+                   "keep only the most certain point in each cube with this side length")
       ->check(between(0, 1000))
       ->type_name("MM");
   command->add_option("--stride", options.stride, "keep the pixels of every Nth row and column")
@@ -94,7 +96,7 @@ void add_scan(CLI::App& app, ClientOptions& options) {
   scan->add_option("--coordinate-frame", options.coordinate_frame, "the frame of the points (as configured)")
       ->check(one_of({"rig", "robot_base"}));
   CLI::Option* notation =
-      scan->add_option("--poses", options.pose_notation, "how the robot writes its pose; slsctl(1) explains each")
+      scan->add_option("--poses", options.pose_notation, "the notation of the robot's pose; slsctl(1) explains each")
           ->check(one_of(slsd::pose_notation_names()));
   CLI::Option* pose =
       scan->add_option("--robot-pose", options.robot_pose, "the robot's pose, if the scanner is on its arm")
@@ -103,16 +105,17 @@ void add_scan(CLI::App& app, ClientOptions& options) {
           ->type_name("N,N,...")
           ->needs(notation);
   notation->needs(pose);
-  scan->add_flag("--normals", options.normals, "also write the surface's normals (of pixels)");
-  scan->add_flag("--mesh", options.mesh, "join the points (of pixels) to triangles; .stl, .obj and .glb always do");
-  scan->add_flag("--colour", options.colour, "also give the points their colour, from a frame in white light");
+  scan->add_flag("--normals", options.normals, "also write the surface's normals; needs --density pixels");
+  scan->add_flag("--mesh", options.mesh,
+                 "join the points into triangles, as .stl, .obj and .glb always do; needs --density pixels");
+  scan->add_flag("--colour", options.colour, "also write each point's colour, from a frame in white light");
   scan->add_flag("--texture", options.texture, "also take a frame in white light, for the points' intensities");
   scan->add_flag("--ambient", options.ambient,
                  "also take a frame without the projector's light, and subtract the room's light");
   CLI::Option* picture =
       scan->add_option("--picture", options.picture, "write the camera's frame with the decoded symbols drawn in")
           ->type_name("FILE.png");
-  scan->add_flag("--why", options.why, "mark each rejected region in the picture by the rule that rejected it")
+  scan->add_flag("--why", options.why, "with --picture: mark each rejected region with the rule that rejected it")
       ->needs(picture);
   scan->add_option("--cloud-picture", options.cloud_picture, "write a picture of the cloud")->type_name("FILE.png");
   add_camera(scan, options, "the camera of --picture (the first)");
@@ -129,10 +132,10 @@ void add_record(CLI::App& app, ClientOptions& options) {
   record->add_option("--seconds", options.seconds, "end after this many seconds")
       ->check(between(0.001, 1e9))
       ->type_name("S");
-  CLI::Option* clouds = record->add_flag("--clouds", options.clouds, "keep the clouds too");
+  CLI::Option* clouds = record->add_flag("--clouds", options.clouds, "also keep the clouds");
   add_density(record, options);
   add_part(record, options);
-  record->add_flag("--normals", options.normals, "the clouds also have the surface's normals (of pixels)")
+  record->add_flag("--normals", options.normals, "also keep the surface's normals; needs --density pixels")
       ->needs(clouds);
   add_timeout(record, options);
 }
@@ -154,7 +157,7 @@ void add_watching(CLI::App& app, ClientOptions& options) {
   add_count(top, options, "--count", "end after this many updates");
   CLI::App* metrics = add_command(app, kWatch, "metrics", "print the service's metrics, as text for Prometheus",
                                   "  slsctl metrics\n  slsctl metrics -o /var/lib/node_exporter/slsd.prom\n");
-  metrics->add_option("-o,--output,FILE", options.output, "the file to write; readers never see a part of it")
+  metrics->add_option("-o,--output,FILE", options.output, "the file to write; readers always see a complete file")
       ->type_name("FILE");
   metrics
       ->add_option("--format", options.metrics_format,
@@ -171,7 +174,7 @@ void add_image(CLI::App& app, ClientOptions& options, const char* group, const s
   if (name == "pattern") return;
   add_camera(command, options, "which camera (the first)");
   add_timeout(command, options);
-  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "keep what the projector shows");
+  if (name == "frame") command->add_flag("--as-shown", options.as_shown, "leave the projected picture unchanged");
 }
 
 const CLI::Validator kPicture(
@@ -198,10 +201,10 @@ void add_calibrate(CLI::App& app, ClientOptions& options) {
                                     "  slsctl calibrate cancel\n");
   calibrate
       ->add_option("ACTION", options.action,
-                   "begin a calibration and follow it (begin), or look at, end or cancel the one under way")
+                   "begin: start a calibration and follow it; look, end, cancel: show, finish or abort the current one")
       ->check(one_of({"begin", "look", "end", "cancel"}));
   calibrate->add_option("--board", options.board, "the board; slsd(8) lists the kinds");
-  calibrate->add_option("--ruler", options.ruler, "the length on the print's ruler, and what it measures, in mm")
+  calibrate->add_option("--ruler", options.ruler, "the printed ruler's nominal and measured length, in mm")
       ->type_name("NOMINAL:MEASURED");
   calibrate->add_option("--code", options.code, "what to project onto the board (pattern)")
       ->check(one_of({"pattern", "gray"}));
@@ -273,7 +276,7 @@ void add_settings(CLI::App& app, ClientOptions& options) {
       ->required()
       ->check(kAssignment)
       ->type_name("TABLE.KEY=VALUE");
-  add_command(app, kSetUp, "settings", "list the settings that are given, and where each comes from",
+  add_command(app, kSetUp, "settings", "list the settings that were set, and the source of each",
               "  slsctl settings\n");
 }
 
@@ -289,17 +292,17 @@ void add_plane(CLI::App& app, ClientOptions& options) {
                                 "  slsctl plane\n"
                                 "  slsctl plane --set --margin-mm 2\n"
                                 "  slsctl set cloud.plane=default\n");
-  plane->add_flag("--set", options.set, "from now on, drop all points on the plane or behind it");
+  plane->add_flag("--set", options.set, "drop all points on or behind the plane in all further scans");
   plane
       ->add_option("--margin-mm", options.margin_mm,
-                   "also drop points up to this far before the plane (5 times the scatter of its points)")
+                   "also drop points up to this far in front of the plane (5 times the scatter of its points)")
       ->check(between(0, 1000))
       ->type_name("MM");
   add_timeout(plane, options);
 }
 
 void add_preset(CLI::App& app, ClientOptions& options) {
-  CLI::App* preset = add_command(app, kSetUp, "preset", "store the settings that are set by name, and use them again",
+  CLI::App* preset = add_command(app, kSetUp, "preset", "save the current settings under a name, and use them again",
                                  "  slsctl preset save part-a\n"
                                  "  slsctl preset list\n"
                                  "  slsctl preset use part-a\n"

@@ -104,13 +104,13 @@ void Relay::start() {
   if (!is_allowed(room_.options.allow, address)) {
     return refuse(nullptr,
                   rpc_error({ErrorCode::kPermissionDenied,
-                             "this address is not served: name it with --allow when slsd-tcp starts", address_}));
+                             "this address may not connect: start slsd-tcp with --allow and this address", address_}));
   }
   const auto waiting = room_.strangers.find(address_);
   if (waiting != room_.strangers.end() && waiting->second >= kStrangersOfOneMax) {
     return refuse(nullptr,
                   rpc_error({ErrorCode::kBusy,
-                             fmt::format("{} connections of this address have sent no token: close them, or wait",
+                             fmt::format("{} connections from this address have sent no token: close them, or wait",
                                          kStrangersOfOneMax),
                              address_}));
   }

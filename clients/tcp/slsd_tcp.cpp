@@ -58,7 +58,7 @@ slsd::Result<> serve(TcpOptions options, const std::vector<std::string>& allow, 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Serves the socket of a structured-light scanner over TCP, to named addresses with a token.",
+  CLI::App app("Serves the socket of a structured-light scanner over TCP, to listed addresses that send a token.",
                "slsd-tcp");
   TcpOptions options;
   options.socket = slsd::client::default_socket();

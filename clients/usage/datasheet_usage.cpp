@@ -27,7 +27,7 @@ void add_datasheet_options(CLI::App& command, DatasheetRequest& request) {
                   "the certificate's expanded uncertainty (k = 2) of these lengths (0)")
       ->check(between(0, 10))
       ->type_name("MM");
-  command.add_option("--note", request.note, "a line for the sheet, such as who measured, and the temperature")
+  command.add_option("--note", request.note, "a line for the sheet, such as the operator and the temperature")
       ->type_name("TEXT");
   command.add_option("-o,--output", request.output, "the sheet (datasheet.pdf in that folder)")->type_name("FILE.pdf");
   command.add_option("--ball-bar", request.ball_bar, "write a bar with two spheres to print, and measure nothing")

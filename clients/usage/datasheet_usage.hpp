@@ -29,7 +29,8 @@ void add_datasheet_options(CLI::App& command, DatasheetRequest& request);
 [[nodiscard]] std::string wrong_datasheet(const DatasheetRequest& request);
 
 inline constexpr const char* kDatasheetProgram = "slsd-datasheet";
-inline constexpr const char* kDatasheetPurpose = "measure how exact the scanner is, with a plate and spheres, as a PDF";
+inline constexpr const char* kDatasheetPurpose =
+    "measure the scanner's accuracy with a plate and spheres, and write a PDF";
 inline constexpr const char* kDatasheetExamples =
     "  slsctl datasheet acceptance --plate 6\n"
     "  slsctl datasheet acceptance --sphere 10 --bar 7 --diameter-mm 40.012 --spacing-mm 200.034\n";

@@ -33,7 +33,7 @@ struct HandEyeRequest {
 void add_hand_eye_options(CLI::App& command, HandEyeRequest& request);
 
 inline constexpr const char* kHandEyeProgram = "slsd-hand-eye";
-inline constexpr const char* kHandEyePurpose = "calibrate the scanner's place on a robot's arm or in its cell";
+inline constexpr const char* kHandEyePurpose = "calibrate the scanner's pose on a robot's arm or in its cell";
 inline constexpr const char* kHandEyeExamples =
     "  slsctl hand-eye --mounted arm --poses ur --from captures\n"
     "  slsctl hand-eye --mounted cell --poses kuka --from captures -o hand_eye.yml\n"

@@ -59,7 +59,7 @@ Result<std::vector<PrintableBoard>> read_boards(const std::filesystem::path& fol
   }
   if (boards.empty())
     return fail(ErrorCode::kNotFound,
-                "no printed boards are there: install slsd-calibrate, or give their folder with --boards",
+                "there are no boards to print: install slsd-calibrate, or name their folder with --boards",
                 folder.string());
   std::sort(boards.begin(), boards.end(), [](const PrintableBoard& a, const PrintableBoard& b) {
     return std::tuple(a.width_mm * a.height_mm, a.name) < std::tuple(b.width_mm * b.height_mm, b.name);

@@ -54,7 +54,7 @@ std::optional<Refusal> Gate::check_origin(const Request& request) const {
   if (auto refused = check_host(request)) return refused;
   if (is_of_this_origin(request)) return std::nullopt;
   return Refusal{403, "not_from_the_page",
-                 "only the page itself may ask for this; a proxy must pass on the header Host with its port"};
+                 "only the page itself may request this; a proxy must pass on the header Host with its port"};
 }
 
 std::optional<Refusal> Gate::check(const Request& request, Clock::time_point now) {

@@ -77,7 +77,8 @@ std::string fault_of_text(const json& body, const char* key) {
   if (!body.contains(key)) return "";
   const std::string text = text_in(body, key);
   const bool plain = std::ranges::all_of(text, [](unsigned char letter) { return letter >= ' ' && letter < 0x7f; });
-  return body[key].is_string() && plain && text.size() <= kTextMax ? "" : std::string(key) + " is no such text";
+  return body[key].is_string() && plain && text.size() <= kTextMax ? ""
+                                                                   : std::string(key) + " must be short ASCII text";
 }
 
 /// @return why these cannot be the user's choices; empty: they can
@@ -89,10 +90,10 @@ std::string fault_of(const json& choices) {
     if (auto fault = fault_of_text(choices, key); !fault.empty()) return fault;
   }
   if (choices.contains("ruler") && !choices.contains("board")) return "a ruler needs its board";
-  if (choices.contains("distance_mm") && !choices["distance_mm"].is_number()) return "distance_mm is not a number";
+  if (choices.contains("distance_mm") && !choices["distance_mm"].is_number()) return "distance_mm must be a number";
   const auto measured = numbers_in(choices, "measured_mm");
   if (choices.contains("measured_mm") && (!measured || measured->size() != 3))
-    return "measured_mm are not three numbers";
+    return "measured_mm must be three numbers";
   return "";
 }
 
@@ -130,7 +131,7 @@ Result<std::vector<json>> read_lines(int descriptor) {
     pollfd waited{descriptor, POLLIN, 0};
     const int ready = left <= 0ms ? 0 : ::poll(&waited, 1, static_cast<int>(left.count()));
     if (ready < 0 && errno == EINTR) continue;
-    if (ready == 0) return fail(ErrorCode::kTimeout, "did not end: use fewer looks", kHandEyeProgram);
+    if (ready == 0) return fail(ErrorCode::kTimeout, "did not end: use fewer views", kHandEyeProgram);
     const ssize_t count = ::read(descriptor, chunk.data(), chunk.size());
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return fail(ErrorCode::kIo, std::generic_category().message(errno), kHandEyeProgram);
@@ -207,7 +208,7 @@ json HandEye::look() const {
 tl::expected<json, Refusal> HandEye::act(const json& body) {
   const std::unique_lock acting(acting_, std::try_to_lock);
   if (!acting)
-    return tl::unexpected(Refusal{503, "busy", "a look is being taken or calculated: wait until that is done"});
+    return tl::unexpected(Refusal{503, "busy", "a view is being taken or evaluated: wait until that is done"});
   {
     const std::lock_guard lock(mutex_);
     busy_ = true;

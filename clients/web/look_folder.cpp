@@ -67,7 +67,7 @@ std::vector<KeptLook> looks_in(const fs::path& folder) {
 
 Result<> erase_look(const fs::path& folder, std::string_view name) {
   if (!is_kept(folder, name))
-    return fail(ErrorCode::kNotFound, "there is no such look: choose one of the list", std::string(name));
+    return fail(ErrorCode::kNotFound, "there is no such view: choose one from the list", std::string(name));
   std::string text;
   for (const std::string& line : lines_of_poses(folder)) {
     if (std::string_view(line).substr(0, line.find(',')) != name) text += line + "\n";
@@ -99,7 +99,7 @@ Result<std::string> picture_of_look(const fs::path& folder, std::string_view nam
       if (each == camera || each.empty()) return read_file(folder / name / each / "white.png", kPictureBytesMax);
     }
   }
-  return fail(ErrorCode::kNotFound, "there is no such picture: choose a look of the list", std::string(name));
+  return fail(ErrorCode::kNotFound, "there is no such picture: choose a view from the list", std::string(name));
 }
 
 }  // namespace slsd::web

@@ -311,7 +311,7 @@ void PageServer::add_requests() {
   get("/api/hand_eye/look", {"look", "camera"}, [this](const Request& request) { return look(request); });
   get("/api/hand_eye/file", [this](const Request&) {
     auto text = read_file(hand_eye_.file(), kResultBytesMax);
-    if (!text) return refusal(404, "not_found", "there is no result yet: take more looks");
+    if (!text) return refusal(404, "not_found", "there is no result yet: take more views");
     return Answer{200, "application/yaml", client::Bytes(std::move(*text)), {}, {}};
   });
   post("/api/hand_eye/act", false, [this](const Request&, const json& body) {
@@ -447,7 +447,7 @@ Answer PageServer::board(const Request& request) const {
   for (PrintableBoard& board : *boards) {
     if (board.name == name) return {200, "application/pdf", client::Bytes(std::move(board.pdf)), {}, {}};
   }
-  return refusal(404, "not_found", "there is no such board: choose one of the list");
+  return refusal(404, "not_found", "there is no such board: choose one from the list");
 }
 
 /// The session, and where its result belongs.

@@ -84,13 +84,13 @@ int main(int argc, char** argv) {
   app.add_option("--port", options.port,
                  "the port to listen on; 0: any free port (" + std::to_string(options.port) + ")")
       ->check(slsd::between(0, 65535));
-  app.add_option("--name", options.names, "another host name under which browsers may open the page");
+  app.add_option("--name", options.names, "another host name by which browsers may open the page; may be repeated");
   app.add_option("--token-file", options.token_file,
                  "a file with the token to enter; default: a new token for each run");
   app.add_option("--three", options.three, "the folder of three.js; default: that of Debian's libjs-three");
   app.add_option("--boards", options.boards, "the folder of boards to print (" + options.boards.string() + ")");
-  app.add_option("--hand-eye", options.looks, "the folder of the looks of a hand-eye calibration");
-  app.add_option("--model", options.model, "the folder of a model's clouds and files");
+  app.add_option("--hand-eye", options.looks, "the folder for the views of a hand-eye calibration");
+  app.add_option("--model", options.model, "the folder for a model's clouds and files");
   app.add_flag("--address", only_address, "print the address and token of the running page, and exit");
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;
   std::signal(SIGPIPE, SIG_IGN);

@@ -33,7 +33,7 @@ ON_A_DISK = """[ -z "$SIZE" ] || mount -t tmpfs -o "size=$SIZE" none "$DISK" || 
 cd "$DISK" && echo before > model.stl || exit
 ([ -z "$LIMIT" ] || ulimit -f "$LIMIT"; trap "" XFSZ; exec "$@"); status=$?
 cp -r . "$AFTER"; exit $status"""
-TWO_BODIES = "two bodies in view move differently: show one alone, or leave out what stands still with --background or --box"
+TWO_BODIES = "two bodies in view move differently: show only one of them, or leave out the static one with --background or --box"
 OWN_MOUNTS = ("unshare", "--mount", "--map-root-user")
 PYTHON_ASKS = ("transport", "timeout_ms", "normals", "texture", "ambient", "picture", "why")
 STEP_DEGREES, SIGMA_MM, ALIKE_PX = 12, 0.05, 6
@@ -313,7 +313,7 @@ class Model(unittest.TestCase):
         (other / "calibration.yml").write_text(calibration(1.01 * FOCUS), encoding="utf-8")
         lone = record(self.folder / "lone", self.clouds[:1])
         cases = {lone: "no place was measured by two clouds", other: "another calibration", self.folder: "is not a recording",
-                 ball: "too little relief: nothing determines turning about the axis"}
+                 ball: "too little relief to determine turning about the axis"}
         for folder, expected in cases.items():
             with self.subTest(expected=expected):
                 done = run("--from", folder, "-o", self.folder / "none.ply")
@@ -384,7 +384,7 @@ class Model(unittest.TestCase):
         self.assertEqual(len(report["fused"]), 29)  # of 30 scans one failed; the last looks from 12 degrees off the first
         self.assertIn("left out: no frame came", done.stderr)
         self.assertIn("found the object again", done.stderr)
-        self.assertRegex(done.stderr, r"seen \d+ of 360 degrees; missing: \d+ to 360 degrees on from the first view")
+        self.assertRegex(done.stderr, r"seen \d+ of 360 degrees; missing: \d+ to 360 degrees after the first view")
         self.assertLess(np.quantile(abs(off_truth_mm(mesh_ply((self.folder / "live.ply").read_bytes())[0])), 0.95), 0.13)
         again = run("--from", kept, "-o", self.folder / "again.ply", "--json")
         self.assertEqual(json.loads(again.stdout), report)
@@ -477,7 +477,7 @@ class Model(unittest.TestCase):
         scanner, _ = self.scanner(self.clouds[:6], {6: "not_calibrated"}.items())
         done = run("--socket", scanner.path, "-o", self.folder / "so_far.ply", "--json")
         self.assertEqual(done.returncode, 1)
-        self.assertIn("no frame came; the model is of the clouds before that", done.stderr)
+        self.assertIn("no frame came; the model is built from the clouds before that", done.stderr)
         self.assertEqual(len(json.loads(done.stdout)["fused"]), 6)
 
     def test_a_cloud_that_cannot_be_kept_ends_with_the_model_so_far(self):
@@ -491,7 +491,7 @@ class Model(unittest.TestCase):
         scanner, _ = self.scanner(clouds)
         done = run("--socket", scanner.path, "-o", self.folder / "full.ply", "--keep", kept, "--json")
         self.assertEqual(done.returncode, 1)
-        self.assertRegex(done.stderr, "00000005.ply.*; the model is of the clouds before that")
+        self.assertRegex(done.stderr, "00000005.ply.*; the model is built from the clouds before that")
         self.assertEqual(len(json.loads(done.stdout)["fused"]), 5)
 
     def on_a_disk(self, *arguments, size="", limit_kib=""):
@@ -535,7 +535,7 @@ class Model(unittest.TestCase):
             self.skipTest("this machine gives no mount namespace")
         done, _, after = self.on_a_disk("-o", "model.stl", "--voxel", "2", size="2100k")
         self.assertEqual(done.returncode, 1)
-        self.assertRegex(done.stderr, "00000005.ply: cannot write: No space .*; the model is of the clouds before that\n$")
+        self.assertRegex(done.stderr, "00000005.ply: cannot write: No space .*; the model is built from the clouds before that\n$")
         self.assertEqual(len(json.loads(done.stdout)["fused"]), 5)
         self.assertEqual(list(after.iterdir()), [after / "model.stl"])
         self.assertEqual((after / "model.stl").stat().st_size, 84 + 50 * json.loads(done.stdout)["triangles"])
@@ -619,7 +619,7 @@ class Model(unittest.TestCase):
             report = model.save(self.folder / "python.stl", close=True, voxel_mm=2, box=[-40, -100, 500, 100, 100, 700])
             self.assertEqual(report["voxel_mm"], 2)
             self.assertGreater(report["invented_share"], 0)
-            with self.assertRaisesRegex(slsd.ScannerError, "no frame can be used: clouds/00000000.ply: it shows almost nothing"):
+            with self.assertRaisesRegex(slsd.ScannerError, "no frame is usable: clouds/00000000.ply: it shows almost nothing"):
                 with slsd.Model(calibration(), program=str(PROGRAM)) as other:
                     other.add(slsd.read_ply(self.clouds[0]))
                     other.mesh(background=slsd.read_ply(self.clouds[0]))

@@ -133,7 +133,7 @@ class Operator(HandEye):
                 if i == 4 and "next_pose" in told["outcome"]:
                     browser.click("#use-next")
                     self.assertEqual(browser.run("return numbersOfPose(document.getElementById('robot-pose').value);"), told["outcome"]["next_pose"])
-            self.assertRegex(browser.run(f"return {VERDICT};"), r"is (good|usable): 95 % of points at \d+ mm are placed to [0-2]\.\d\d mm")
+            self.assertRegex(browser.run(f"return {VERDICT};"), r"is (good|usable): 95 % of points at \d+ mm are placed within [0-2]\.\d\d mm")
             self.picture(browser, "light", 1600)
             self.check_place(self.looks / "hand_eye.yml")
             browser.click("#hand-eye-save")

@@ -312,7 +312,7 @@ class Space(unittest.TestCase):
         with service.client() as client:
             self.assertEqual(client.call("settings")[0]["set"]["cloud"], {"box": [-1000, -1000, 100, 1000, 1000, 2100], "box_frame": "rig"})
             self.assertEqual(client.call("scan", density="pixels", timeout_ms=600000)[0]["points"], count)
-        self.assertEqual(self.note(), "Every scan measures this box alone.")
+        self.assertEqual(self.note(), "Every scan measures only this box.")
         self.assertEqual(self.browser.complaints(), [])
 
     def test_a_status_from_before_a_change_is_not_shown(self):

@@ -151,13 +151,13 @@ class Refuses(unittest.TestCase):
         with Tcp(self.service.socket, "--listen", "0.0.0.0", "--allow", "127.0.0.7", "--allow", "127.1.0.0/16") as tcp:
             name, message = one_error(tcp.say(b""))
             self.assertEqual(name, "permission_denied")
-            self.assertRegex(message, "^127.0.0.1: this address is not served: name it with --allow")
+            self.assertRegex(message, "^127.0.0.1: this address may not connect: start slsd-tcp with --allow")
             for source in ("127.0.0.7", "127.1.2.3"):
                 with tcp.client(source=source) as client:
                     client.call("settings")
             name, _ = one_error(tcp.say(greeting(), source="127.2.0.1"))
             self.assertEqual(name, "permission_denied")
-            self.assertIn("refused 127.0.0.1: this address is not served", tcp.log_text())
+            self.assertIn("refused 127.0.0.1: this address may not connect", tcp.log_text())
 
     def test_more_clients_than_there_are_places(self):
         with Tcp(self.service.socket, "--clients-max", 2) as tcp, tcp.client() as first:
@@ -185,7 +185,7 @@ class Refuses(unittest.TestCase):
             try:
                 name, message = one_error(tcp.say(b""))
                 self.assertEqual(name, "busy")
-                self.assertIn("4 connections of this address have sent no token", message)
+                self.assertIn("4 connections from this address have sent no token", message)
                 with tcp.client(source="127.0.0.2") as client:
                     client.call("settings")
                 for connection in silent:

@@ -69,7 +69,7 @@ void RobotPoses::take(const Reader& reader, bool fixed) {
   };
   while (const auto sample = reader.take()) {
     const auto message = decode<ros::TFMessage>(sample->bytes);
-    if (!message) refuse("tf_malformed: a message is no tf2_msgs/TFMessage");
+    if (!message) refuse("tf_malformed: a message is not a tf2_msgs/TFMessage");
     if (!message) continue;
     for (const auto& transform : message->transforms) {
       const auto added = tree_.add(transform, fixed, id_of(sample->from.guid), ros_now());
@@ -114,10 +114,10 @@ Result<RigidTransform> RobotPoses::look_up_standing() const {
     const double moved_mm = (pose->translation - earlier->translation).norm();
     const double turned = Eigen::AngleAxisd(pose->rotation.transpose() * earlier->rotation).angle();
     if (moved_mm <= kStandingMm && turned * 180 / std::numbers::pi <= kStandingDegrees) continue;
-    return fail(ErrorCode::kBusy,
-                fmt::format("flange_moves: \"{}\" moved by {:.2f} mm and {:.3f} degrees within {} ms: let the robot "
-                            "stand",
-                            frames_.flange, moved_mm, turned * 180 / std::numbers::pi, before.count()));
+    return fail(
+        ErrorCode::kBusy,
+        fmt::format("flange_moves: \"{}\" moved by {:.2f} mm and {:.3f} degrees within {} ms: keep the robot still",
+                    frames_.flange, moved_mm, turned * 180 / std::numbers::pi, before.count()));
   }
   return pose;
 }

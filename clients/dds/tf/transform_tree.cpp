@@ -44,18 +44,18 @@ Result<> check_numbers(const ros::TransformStamped& told, const std::string& par
 Result<> check_stamp(RosTime at, const std::string& child, RosTime now) {
   if (at == RosTime()) {
     return fail(ErrorCode::kInvalidArgument,
-                fmt::format("tf_stamp: the transform of \"{}\" has the time zero: its publisher knows no time", child));
+                fmt::format("tf_stamp: the transform of \"{}\" has the time zero: its publisher sets no time", child));
   }
   if (at > now + TransformTree::kAheadMax) {
     return fail(ErrorCode::kInvalidArgument,
-                fmt::format("tf_future: the transform of \"{}\" is stamped {:.3g} s in the future: let the clocks of "
-                            "both hosts agree (chrony, PTP)",
+                fmt::format("tf_future: the transform of \"{}\" is stamped {:.3g} s in the future: synchronise the "
+                            "clocks of both hosts (chrony, PTP)",
                             child, seconds_between(now, at)));
   }
   if (at < now - TransformTree::kHistory) {
     return fail(ErrorCode::kInvalidArgument,
-                fmt::format("tf_old: the transform of \"{}\" is {:.3g} s old: let the clocks of both hosts agree "
-                            "(chrony, PTP), and use no simulated time",
+                fmt::format("tf_old: the transform of \"{}\" is {:.3g} s old: synchronise the clocks of both hosts "
+                            "(chrony, PTP), and do not use simulated time",
                             child, seconds_between(at, now)));
   }
   return {};
@@ -153,7 +153,7 @@ Result<TransformTree::Paths> TransformTree::paths(const std::string& base, const
   const std::string base_root = to_base->empty() ? base : to_base->back()->second.parent;
   const std::string flange_root = to_flange->empty() ? flange : to_flange->back()->second.parent;
   if (base_root != flange_root) {
-    return fail(ErrorCode::kNotFound, fmt::format("tf_unconnected: \"{}\" hangs on \"{}\", but \"{}\" on \"{}\"",
+    return fail(ErrorCode::kNotFound, fmt::format("tf_unconnected: \"{}\" descends from \"{}\", but \"{}\" from \"{}\"",
                                                   flange, flange_root, base, base_root));
   }
   while (!to_base->empty() && !to_flange->empty() && to_base->back() == to_flange->back()) {

@@ -135,11 +135,11 @@ bool fits(const Alignment& alignment) {
 
 std::string refusal_of(const Alignment& alignment) {
   if (alignment.determined < kFewestDetermined)
-    return "the surface has too little relief: nothing determines " + to_string(alignment.least_determined);
+    return "the surface has too little relief to determine " + to_string(alignment.least_determined);
   if (alignment.overlap < kFewestOverlap)
-    return fmt::format("only {:.0f} % of what it shows lies on the surface so far", 100 * alignment.overlap);
+    return fmt::format("only {:.0f} % of its points lie on the surface so far", 100 * alignment.overlap);
   if (alignment.agreeing < kFewestAgreeing || alignment.fit > kGreatestFit)
-    return fmt::format("it does not fit: its usual distance is {:.1f} sigma, and {:.0f} % agree within three",
+    return fmt::format("it does not fit: its typical distance is {:.1f} sigma, and {:.0f} % agree within three",
                        alignment.fit, 100 * alignment.agreeing);
   return {};
 }

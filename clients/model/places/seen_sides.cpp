@@ -78,7 +78,7 @@ SeenSides seen_sides(std::span<const RigidTransform> object_from_rig, const Eige
 std::string to_string(const SeenSides& sides) {
   if (sides.all()) return "seen from all sides";
   if (sides.seen_degrees <= 0) return "seen from one side: turn the object";
-  return fmt::format("seen {:.0f} of 360 degrees; missing: {:.0f} to {:.0f} degrees on from the first view",
+  return fmt::format("seen {:.0f} of 360 degrees; missing: {:.0f} to {:.0f} degrees after the first view",
                      sides.seen_degrees, sides.gap_begins_degrees, sides.gap_begins_degrees + sides.gap_degrees);
 }
 

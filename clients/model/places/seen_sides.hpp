@@ -30,7 +30,7 @@ struct SeenSides {
 /// @thread                 reentrant
 [[nodiscard]] SeenSides seen_sides(std::span<const RigidTransform> object_from_rig, const Eigen::Vector3d& middle_mm);
 
-/// "seen 210 of 360 degrees; missing: 210 to 360 degrees on from the first view"
+/// "seen 210 of 360 degrees; missing: 210 to 360 degrees after the first view"
 [[nodiscard]] std::string to_string(const SeenSides& sides);
 
 }  // namespace slsd::model

@@ -27,7 +27,8 @@ constexpr std::size_t kFewestCells = 100;
 constexpr int kRounds = 3;
 
 constexpr const char* kTwoBodies =
-    "two bodies in view move differently: show one alone, or leave out what stands still with --background or --box";
+    "two bodies in view move differently: show only one of them, or leave out the static one with --background or "
+    "--box";
 
 }  // namespace
 
@@ -111,7 +112,7 @@ bool Tracker::is_of_two(const Shot& shot, const RigidTransform& object_from_rig,
 
 Tracked Tracker::follow(const Shot& shot) {
   const std::vector<PlacedShot> references = latest_keyframes();
-  std::string refusal = "it meets nothing of the surface so far";
+  std::string refusal = "it does not overlap the surface so far";
   double most = 0;
   for (std::size_t first = 0; first < kCellSteps.size(); ++first) {
     for (const RigidTransform& start : {expected(), frames_.back().object_from_rig}) {

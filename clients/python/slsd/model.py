@@ -112,10 +112,10 @@ class Model:
              box: Sequence[float] | None = None, background: Cloud | None = None) -> dict[str, Any]:
         """Writes the mesh to a .ply, .stl, .obj, .glb or .3mf file, and returns the report.
 
-        close       closes all holes, as for printing: invents surface that no cloud measured
-        voxel_mm    the mesh's resolution; None: by the clouds' pixels and sigmas
-        box         uses points in this box alone: x, y and z of its least corner, then of the other, mm
-        background  leaves out what this dense cloud of the scene without the object shows, as table and wall
+        close       closes all holes, for 3D printing: invents surface that no cloud measured
+        voxel_mm    the mesh's resolution; None: from the clouds' pixels and sigmas
+        box         uses only points in this box: x, y and z of its least corner, then of its greatest, mm
+        background  leaves out the surfaces in this dense cloud of the empty scene, such as table and wall
 
         Raises ScannerError if the clouds give no mesh; its text says why.
         """

@@ -99,15 +99,15 @@ class Scanner:
                  service lends a few dense clouds at once. False copies
         why      lists the rules that rejected regions, with remedies, in `description["reasons"]`; the picture marks
                  each region by its rule
-        preset   puts the settings of this preset into force, where they stay, and scans with them
+        preset   applies the settings of this preset, which stay in force, and scans with them
         coordinate_frame  the frame of the points; None: as configured
         robot_pose  the pose of the robot whose arm carries the scanner, in its own numbers
-        poses    how the robot writes them: "ur", "kuka", "abb", ...
-        box      measures within this box alone: x, y and z of its least corner, then of the other, in mm; ():
-                 everything; None: as configured, here and below
-        plane    drops what lies on this plane or behind it: x, y and z of its unit normal, and its offset along it, mm
+        poses    the notation of these numbers: "ur", "kuka", "abb", ...
+        box      measures only within this box: x, y and z of its least corner, then of its greatest, in mm;
+                 (): everything; None: as configured, here and below
+        plane    drops points on or behind this plane: x, y and z of its unit normal, and its offset along it, mm
         box_frame  the frame of box and plane
-        voxel_mm keeps one point, the most certain, of each cube of this side
+        voxel_mm keeps only the most certain point in each cube with this side length
         stride   keeps the pixels of every Nth row and column
         """
         params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),

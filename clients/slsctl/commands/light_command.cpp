@@ -71,12 +71,10 @@ std::string levels_text(const FrameLight& light) {
   const LightLevels& levels = light.levels;
   if (levels.patterned_share == 0) return "the pattern is not visible\n";
   return fmt::format(
-      "pattern       on {:.0f} % of the frame\n"
-      "level         symbols {:.0f} of {:.0f}, between them {:.0f}\n"
-      "blur          edges {:.2f} px wide, {:.3f} of the period of {:.1f} px\n"
-      "clipped       {:.0f} % of the symbols' pixels, symbols on {:.0f} % of the pattern\n"
-      "room light    {:.2f} times the pattern's, with what the scene scatters\n"
-      "noise         {:.1f} between the symbols, {:.1f} on them\n",
+      "pattern       on {:.0f} % of the frame\nlevel         symbols {:.0f} of {:.0f}, between them {:.0f}\nblur       "
+      "   edges {:.2f} px wide, {:.3f} of the period of {:.1f} px\nclipped       {:.0f} % of the symbols' pixels, "
+      "symbols on {:.0f} % of the pattern\nroom light    {:.2f} times the pattern's, including scattered light\nnoise  "
+      "       {:.1f} between the symbols, {:.1f} on them\n",
       100 * levels.patterned_share, levels.lit, levels.full, levels.dark, levels.edge_px,
       levels.edge_px / levels.period_px, levels.period_px, 100 * levels.clipped_of_lit, 100 * levels.clipped_share,
       levels.room_light(), light.noise_at(levels.dark), light.noise_at(levels.lit));
@@ -92,7 +90,7 @@ std::string change_text(const FrameLight& light) {
          "gamma         " +
          (light.gamma ? fmt::format("{:.2f}, from {:.2f} to {:.2f}; 1: levels are proportional to light\n",
                                     light.gamma->likeliest, light.gamma->low, light.gamma->high)
-                      : "not measurable: the noise does not tell\n") +
+                      : "not measurable: the noise is inconclusive\n") +
          fmt::format("change        brightness {:+.1f} %, bands {:.1f} %, {:.0f} % of the frame moved\n",
                      100 * (change.brighter - 1), 100 * change.bands, 100 * change.moved_share);
 }

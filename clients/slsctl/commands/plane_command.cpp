@@ -78,10 +78,10 @@ void print(const ClientOptions& options, const SeenPlane& plane, const json& num
       "{} of {} points lie on a plane {:.1f} mm from the scanner, tilted by {:.1f} degrees; they scatter by {:.3f} mm "
       "(RMS).\n",
       plane.fit.on_plane.size(), plane.points, distance_mm, tilt_deg, plane.fit.rms_mm);
-  std::cout << fmt::format("cloud.plane={}  drops them, and all up to {:.2f} mm before it.\n", numbers.dump(),
-                           plane.margin_mm);
-  std::cout << (options.set ? "It is in force. slsctl set cloud.plane=default takes it back.\n"
-                            : "slsctl plane --set puts it into force.\n");
+  std::cout << fmt::format("cloud.plane={}  drops them, and all points up to {:.2f} mm in front of it.\n",
+                           numbers.dump(), plane.margin_mm);
+  std::cout << (options.set ? "It is in force. slsctl set cloud.plane=default undoes it.\n"
+                            : "slsctl plane --set puts it in force.\n");
 }
 
 }  // namespace

@@ -233,7 +233,7 @@ std::optional<Refusal> ModelSession::build(const json& choices) {
     const std::lock_guard lock(mutex_);
     if (runs()) return Refusal{503, "busy", "a model is being made: stop it first"};
   }
-  if (kept_clouds() == 0) return not_now("there are no clouds to build a model of: start one");
+  if (kept_clouds() == 0) return not_now("there are no clouds to build a model from: start a session");
   if (auto refused = check_background(choices)) return refused;
   return run({"--from=" + (folder_ / "recording").string()}, choices, kBuilding);
 }
@@ -399,7 +399,7 @@ Result<> ModelSession::end_rebuild(bool done) {
     std::error_code wrong;
     std::filesystem::rename(made_in_ / name, folder_ / name, wrong);
     if (wrong && moved)
-      moved = fail(ErrorCode::kIo, "cannot replace the model before: " + wrong.message() + "; build again",
+      moved = fail(ErrorCode::kIo, "cannot replace the previous model: " + wrong.message() + "; build again",
                    (folder_ / name).string());
   };
   if (done) {

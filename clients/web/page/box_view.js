@@ -21,10 +21,10 @@ const mayKeepBox = () => mayAdminister && boxChosen !== null && !(isBox(boxChose
 function boxInWords() {
   if (boxChosen === null) {
     if (boxIsInBase()) return "Every scan measures a box in the robot's base. The page cannot draw it.";
-    return isBox(partOfService.box) ? "Every scan measures this box alone." : "";
+    return isBox(partOfService.box) ? "Every scan measures only this box." : "";
   }
   if (!isBox(boxChosen)) return "The next scans of this page measure the whole scene.";
-  return "The next scans of this page measure this box alone. Live clouds and other clients still see the rest." +
+  return "The next scans of this page measure only this box. Live clouds and other clients still see the rest." +
     (planeIsInBase() ? " The box cannot be kept for every scan: box and plane have one frame, and a plane is configured in " +
                        "the robot's base. Scans of this box leave that plane out." : "");
 }

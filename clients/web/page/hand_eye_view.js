@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 "use strict";
 
-// Hand-eye calibration: a look at the board for each pose of the robot, the next pose, the verdict and its file.
+// Hand-eye calibration: a view of the board for each pose of the robot, the next pose, the verdict and its file.
 // slsctl hand-eye does the same, and docs/robot.md explains it.
 const kHandEyePause = 2000, kSureFor = 5000;
 const kXyz = ["x", "y", "z"];
@@ -21,7 +21,7 @@ const kNotations = {
   "matrix-m": ["4 × 4 matrix, m", [], "", [...Array(16).keys()].map((i) => `m${Math.floor(i / 4) + 1}${i % 4 + 1}`), ""]};
 
 const kMountingHelp = {
-  arm: "Fasten the board in the cell, where the scanner on the arm can look at it from many sides.",
+  arm: "Fasten the board in the cell, where the scanner on the arm can see it from many sides.",
   cell: "Fasten the board on the arm; the scanner stands in the cell."};
 
 const kHandEyeChoices = ["mounted", "notation", "hand-eye-board", "hand-eye-ruler", "hand-eye-distance", "hand-eye-measured"];
@@ -57,14 +57,14 @@ function understandPose() {
   return right ? numbers : null;
 }
 
-// What the program says to a command line, to somebody at the page.
+// The program's words for a terminal, in those of the page.
 function forThePage(message) {
   return message.replace(/use --poses ([\w-]+)/g, (all, name) => kNotations[name] ? `choose “${kNotations[name][0]}” above` : all)
     .replace("use --mounted arm", "choose “on the robot's arm” above").replace("use --mounted cell", "choose “in the cell” above")
     .replaceAll("leave it out", "delete it");
 }
 
-// ---- a look ----
+// ---- a view ----
 
 async function drawLook(name) {
   const address = `api/hand_eye/look?look=${encodeURIComponent(name)}`;
@@ -77,7 +77,7 @@ async function drawLook(name) {
       $("hand-eye-pictures").replaceChildren();
     }
     const image = await createImageBitmap(await response.blob());
-    const figure = figureOf("look " + camera, image.width, image.height, $("hand-eye-pictures"));
+    const figure = figureOf("view " + camera, image.width, image.height, $("hand-eye-pictures"));
     const context = figure.firstChild.getContext("2d");
     context.drawImage(image, 0, 0);
     context.fillStyle = "#3df06b";
@@ -87,18 +87,18 @@ async function drawLook(name) {
       context.fill();
     }
     figure.lastChild.textContent = `${name}${camera ? ", camera " + camera : ""}: ` +
-      (points.length > 0 ? `${points.length} points of the board` : "the board was not found, or not looked for yet: calculate");
+      (points.length > 0 ? `${points.length} points of the board` : "the board was not found, or not searched for yet: press Calculate");
   }
 }
 
-// What the cameras see when a look was refused; it is not kept.
+// The pictures of a refused view; they are not kept.
 async function drawRefused() {
   $("hand-eye-pictures").replaceChildren();
   for (const {value: camera} of $("which-camera").options) {
     const frame = await askFrame(camera);
-    const figure = figureOf("look " + camera, frame.width, frame.height, $("hand-eye-pictures"));
+    const figure = figureOf("view " + camera, frame.width, frame.height, $("hand-eye-pictures"));
     figure.firstChild.getContext("2d").putImageData(imageOf(frame), 0, 0);
-    figure.lastChild.textContent = `camera ${camera}: this look was not kept`;
+    figure.lastChild.textContent = `camera ${camera}: this view was not kept`;
   }
 }
 
@@ -148,7 +148,7 @@ function showResult(told) {
   if (!told.has_file) return;
   $("hand-eye-command").textContent = told.installs_to ? installing(told) : "the service does not answer";
   $("hand-eye-table").hidden = told.configured !== false;
-  $("hand-eye-table").textContent = `Before it, once, write into ${told.configuration}:\n\n[frame]\noutput = "robot_base"\nhand_eye = "${told.installs_to}"`;
+  $("hand-eye-table").textContent = `Before that, once, add this to ${told.configuration}:\n\n[frame]\noutput = "robot_base"\nhand_eye = "${told.installs_to}"`;
 }
 
 function verdictLines({outcome, error}) {
@@ -156,7 +156,7 @@ function verdictLines({outcome, error}) {
   if (!outcome) return lines;
   if (outcome.missing) lines.push(element("p", forThePage(outcome.missing), "wait"));
   if (outcome.verdict) {
-    lines.push(element("p", `The calibration is ${outcome.verdict}: 95 % of points at ${outcome.distance_mm.toFixed(0)} mm are placed to ` +
+    lines.push(element("p", `The calibration is ${outcome.verdict}: 95 % of points at ${outcome.distance_mm.toFixed(0)} mm are placed within ` +
       `${outcome.error_mm.toFixed(2)} mm.`, {good: "good", usable: "wait"}[outcome.verdict] || "bad"));
     lines.push(element("p", `The robot's poses have a noise of ${outcome.robot_place_sigma_mm.toFixed(3)} mm and ` +
       `${(outcome.robot_turn_sigma_rad * 180 / Math.PI).toFixed(3)}°.`));
@@ -185,13 +185,13 @@ function showHandEye(told) {
   handEyePlaced = true;
   const {looks, outcome, choices} = told;
   $("look-list").hidden = looks.length === 0;
-  $("look-list").caption.textContent = `${countOf(looks.length, "look")}, better 12`;
+  $("look-list").caption.textContent = `${countOf(looks.length, "view")}; 12 or more are better`;
   $("look-list").tBodies[0].replaceChildren(...looks.map((look) => lookRow(look, choices.poses)));
   allow($("hand-eye-calculate"), looks.length > 0);
   allow($("hand-eye-clear"), looks.length > 0);
   allow($("use-next"), Boolean(outcome && outcome.next_pose));
   $("hand-eye-verdict").replaceChildren(...verdictLines(told));
-  if (told.busy) $("hand-eye-state").textContent = "A look is being taken or calculated…";
+  if (told.busy) $("hand-eye-state").textContent = "A view is being taken or evaluated…";
   else if (/being taken/.test($("hand-eye-state").textContent)) $("hand-eye-state").textContent = "";
   showResult(told);
 }
@@ -224,7 +224,7 @@ async function takeLook() {
   const pose = understandPose();
   if (!pose) throw new Error(`Enter the robot's pose: ${kNotations[$("notation").value][0]} has ${needsOf($("notation").value)} numbers.`);
   const before = new Set(handEye ? handEye.looks.map((look) => look.name) : []);
-  const told = await act({action: "take", pose, ...choicesMade()}, "Taking a look. The robot must stand still…");
+  const told = await act({action: "take", pose, ...choicesMade()}, "Taking a view. The robot must stand still…");
   const taken = told.looks.find((look) => !before.has(look.name));
   $("hand-eye-state").className = taken ? "good" : "bad";
   $("hand-eye-state").textContent = taken ? `TAKEN ✓ ${taken.name}` : "Not taken";
@@ -256,7 +256,7 @@ function beginHandEye() {
   });
   onClick($("take-look"), takeLook);
   onClick($("hand-eye-calculate"), () => act({action: "calculate", ...choicesMade()}, "Calculating…"));
-  onSecondPress($("hand-eye-clear"), () => `Delete ${countOf(handEye.looks.length, "look")}?`, async () => {
+  onSecondPress($("hand-eye-clear"), () => `Delete ${countOf(handEye.looks.length, "view")}?`, async () => {
     await act({action: "clear"}, "");
     $("hand-eye-pictures").replaceChildren();
   });

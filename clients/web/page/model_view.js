@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 "use strict";
 
-// The view "Model": slsd-model on the scanner follows an object that turns, and fuses its clouds to a mesh. Every browser
+// The view "Model": slsd-model on the scanner follows an object that turns, and fuses its clouds into a mesh. Every browser
 // sees the same session.
 const kModelPause = 400, kModelIdlePause = 2000;  // ms
 const kSeenAround = 15;  // degrees to either side that a view shows
@@ -17,7 +17,7 @@ const modelRuns = () => modelTold !== null && ["following", "building"].includes
 function sidesInWords({seen_degrees: seen, missing_from_degrees: from, missing_degrees: missing, seen_from_all_sides: all}) {
   if (all) return "Seen from all sides.";
   if (seen <= 0) return "Seen from one side: turn the object.";
-  return `Seen ${seen.toFixed(0)}° of 360°. Missing: ${from.toFixed(0)}° to ${(from + missing).toFixed(0)}° on from the first view.`;
+  return `Seen ${seen.toFixed(0)}° of 360°. Missing: ${from.toFixed(0)}° to ${(from + missing).toFixed(0)}° after the first view.`;
 }
 
 // From above: the first view below, the others as they follow in the direction of the turn; green was seen, the white mark
@@ -47,7 +47,7 @@ function drawRing(progress) {
 
 // ---- the state ----
 
-// What the program says to a command line, to somebody at the page.
+// The program's words for a terminal, in those of the page.
 const modelWords = (sentence) => sentence.replace("press Enter", "press “Next view”").replace("; Ctrl-C ends, and writes the model", "");
 
 function modelState({state, progress, building, choices, report, kept_clouds: kept}) {
@@ -62,18 +62,18 @@ function modelState({state, progress, building, choices, report, kept_clouds: ke
     return ["", building.fused < building.of ? `Fusing cloud ${building.fused + 1} of ${building.of}…` : "Meshing, writing the files…"];
   }
   if (state === "done") return ["good", "The model is ready ✓"];
-  if (state === "failed") return ["bad", report ? "The new build failed. The model before is kept." : "There is no model."];
-  if (state === "cut") return ["wait", `The last session was cut. ${countOf(kept, "cloud")} are kept: build a model of them.`];
+  if (state === "failed") return ["bad", report ? "The new build failed. The previous model is kept." : "There is no model."];
+  if (state === "cut") return ["wait", `The last session was interrupted. ${countOf(kept, "cloud")} are kept: build a model from them.`];
   return ["", ""];
 }
 
 function reportInWords(report, state) {
-  const lines = state === "done" ? [] : ["The model before:"];
+  const lines = state === "done" ? [] : ["Previous model:"];
   lines.push(`${report.fused} of ${countOf(report.frames, "cloud")} fused; the object turned by ${report.turned_degrees.toFixed(0)}°.`,
-             `${report.triangles.toLocaleString("en")} triangles, voxels of ${report.voxel_mm.toFixed(2)} mm, usual sigma ${report.sigma_mm.toFixed(3)} mm.`,
+             `${report.triangles.toLocaleString("en")} triangles, voxels of ${report.voxel_mm.toFixed(2)} mm, median sigma ${report.sigma_mm.toFixed(3)} mm.`,
              report.closed ? `The end meets the beginning: ${report.drift_mm.toFixed(2)} mm apart before, ${report.seam_mm.toFixed(2)} mm after the adjustment.`
                            : "The end does not meet the beginning: not all sides were seen.");
-  if (report.invented_share > 0) lines.push(`${(100 * report.invented_share).toFixed(1)} % of the surface is invented, to close it.`);
+  if (report.invented_share > 0) lines.push(`${(100 * report.invented_share).toFixed(1)} % of the surface is invented, to close the holes.`);
   for (const {frame, reason} of report.refused) lines.push(`${frame} was left out: ${reason}`);
   return lines.join("\n");
 }

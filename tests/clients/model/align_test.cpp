@@ -42,7 +42,7 @@ TEST(Align, NamesTheTurnOfABall) {
   // The axis leads through the ball's middle.
   const Eigen::Vector3d off = kMiddle - found->least_determined.through_mm;
   EXPECT_LT(off.cross(found->least_determined.axis).norm(), 5);
-  EXPECT_THAT(refusal_of(*found), StartsWith("the surface has too little relief: nothing determines turning about"));
+  EXPECT_THAT(refusal_of(*found), StartsWith("the surface has too little relief to determine turning about"));
 }
 
 TEST(Align, NamesTheAxisOfACylinder) {

@@ -56,7 +56,7 @@ TEST(SeenSides, CountTurnsBackOnce) {
 TEST(SeenSides, NameAGapInTheMiddle) {
   // Tracking was lost from 90 to 200 degrees.
   const SeenSides sides = seen_sides(turned({0, 30, 60, 90, 200, 230, 260, 290, 320, 350}, {0, 1, 0}), kObjectMiddle);
-  EXPECT_EQ(to_string(sides), "seen 250 of 360 degrees; missing: 90 to 200 degrees on from the first view");
+  EXPECT_EQ(to_string(sides), "seen 250 of 360 degrees; missing: 90 to 200 degrees after the first view");
 }
 
 TEST(SeenSides, AreUnknownBeforeTheObjectTurns) {

@@ -145,7 +145,7 @@ class PrintPose(unittest.TestCase):
         nan = float("nan")
         bad = {  # by the flange's name: what is published of it, and what is said
             "nowhere": ([], 'tf_missing: tf has no frame "nowhere"'),
-            "apart": ([("tf", "moon", "apart", (0, 0, 1), IDENTITY, 0.0)], 'tf_unconnected: "apart" hangs on "moon"'),
+            "apart": ([("tf", "moon", "apart", (0, 0, 1), IDENTITY, 0.0)], 'tf_unconnected: "apart" descends from "moon"'),
             "nan": ([("tf", "wrist", "nan", (0, nan, 1), IDENTITY, 0.0)], "has a number that is not finite"),
             "long": ([("tf", "wrist", "long", (0, 0, 1), (0, 0, 1, 1), 0.0)], "has a quaternion of length 1.41 instead of 1"),
             "timeless": ([("tf", "wrist", "timeless", (0, 0, 1), IDENTITY, None)], 'tf_stamp: the transform of "timeless"'),

@@ -147,7 +147,7 @@ TEST_F(TransformTreeTest, NamesWhatIsMissing) {
   add(told("base", "arm", kNow));
   EXPECT_EQ(why_not(kNow), "tf_missing: tf has no frame \"tool\"");
   add(told("other", "tool", {}), true);
-  EXPECT_EQ(why_not(kNow), "tf_unconnected: \"tool\" hangs on \"other\", but \"base\" on \"base\"");
+  EXPECT_EQ(why_not(kNow), "tf_unconnected: \"tool\" descends from \"other\", but \"base\" from \"base\"");
   EXPECT_EQ(tree_.base_from_flange("base", "tool", kNow, kNow).error().code, ErrorCode::kNotFound);
   add(told("/arm", "/other", {}), true);
   EXPECT_EQ(why_not(kNow), "");

@@ -30,13 +30,13 @@ struct ScanOptions {
   std::string coordinate_frame;    ///< "rig" or "robot_base"; empty: as configured
   std::vector<double> robot_pose;  ///< the pose of the robot whose arm carries the scanner, in its own numbers
   std::string poses;               ///< how the robot writes them: "ur", "kuka", ...; with robot_pose
-  /// Measures within this box alone: x, y and z of its least corner, then of the other, mm. Empty: as configured, here
-  /// and below.
+  /// Measures only within this box: x, y and z of its least corner, then of its greatest, mm. Empty: as configured,
+  /// here and below.
   std::vector<double> box;
   /// Drops what lies on this plane or behind it: x, y and z of its unit normal, and its offset along it, mm.
   std::vector<double> plane;
   std::string box_frame;           ///< of box and plane: "rig" or "robot_base"
-  std::optional<double> voxel_mm;  ///< keeps one point, the most certain, of each cube of this side
+  std::optional<double> voxel_mm;  ///< keeps only the most certain point in each cube with this side
   std::optional<int> stride;       ///< keeps the pixels of every Nth row and column
 };
 
