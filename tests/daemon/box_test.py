@@ -169,7 +169,7 @@ class Box(unittest.TestCase):
         self.assertEqual(scan["pixels"]["behind_plane"], np.count_nonzero(~side(self.pixels)))
         scan = self.call("scan", plane=[0, 0, -1, -100])
         self.assertEqual(scan["points"], 0)
-        self.assertIn("before the plane", scan["empty"])
+        self.assertIn("in front of the plane", scan["empty"])
 
     def test_of_a_plane_that_was_measured(self):
         words = ["--socket", str(self.service.socket)]

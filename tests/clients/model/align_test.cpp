@@ -49,7 +49,7 @@ TEST(Align, NamesTheAxisOfACylinder) {
   const auto found = aligned(cylinder, rig_from_object(0), rig_from_object(5));
   ASSERT_TRUE(found.has_value());
   EXPECT_LT(found->determined, 0.002);
-  EXPECT_THAT(refusal_of(*found), HasSubstr("nothing determines"));
+  EXPECT_THAT(refusal_of(*found), HasSubstr("too little relief to determine"));
   EXPECT_GT(std::abs(found->least_determined.axis.y()), 0.95);
 }
 
