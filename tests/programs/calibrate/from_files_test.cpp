@@ -362,8 +362,8 @@ TEST_F(FromFiles, ReplacesNoCalibrationOfAnotherScaleUnlessForced) {
   truth.cameras[0].name = "camera";
   write_text(home_ / "calibration.yml", write_calibration(truth));
   request_.board = "charuco:7x5:61.8:46.35:DICT_5X5_100";
-  EXPECT_THAT(refusal(), testing::AllOf(ContainsRegex("measures (59\\.9|60\\.[01])"), HasSubstr("should have 61.80 mm"),
-                                        HasSubstr("--force")));
+  EXPECT_THAT(refusal(), testing::AllOf(ContainsRegex("measures (59\\.9|60\\.[01])"),
+                                        HasSubstr("for a board spacing of 61.80 mm"), HasSubstr("--force")));
   request_.force = true;
   const auto done = calibrate_from_files(request_);
   ASSERT_TRUE(done) << to_string(done.error());
