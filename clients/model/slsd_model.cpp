@@ -239,8 +239,8 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", "slsd-model " SLSD_VERSION);
   app.add_option("-o,--output", options.outputs, "the mesh to write: .ply, .stl, .obj, .glb or .3mf; may be repeated")
       ->allow_extra_args(false);
-  auto* const from = app.add_option("--from", options.recording,
-                                    "use the clouds of this recording (slsctl record --clouds) instead of scanning");
+  auto* const from =
+      app.add_option("--from", options.recording, "use the clouds of this recording of slsctl instead of scanning");
   const auto live = [&](CLI::Option* option) { return option->excludes(from); };
   live(app.add_option("--socket", options.socket,
                       "the service's socket; default: SLSD_SOCKET if set (" + options.socket.string() + ")"));
