@@ -102,7 +102,7 @@ std::string unknown_option(const CLI::App& app, const CLI::App& chosen, const st
   for (const CLI::App* at = &chosen; at != nullptr; at = at->get_parent())
     for (const CLI::Option* option : at->get_options())
       names.insert(names.end(), option->get_lnames().begin(), option->get_lnames().end());
-  const std::string problem = "there is no option " + quoted(name);
+  std::string problem = "there is no option " + quoted(name);
   if (const auto nearest = nearest_name(bare, names)) return problem + "; did you mean --" + *nearest + "?";
   for (const CLI::App* command : app.get_subcommands(nullptr))
     if (command->get_option_no_throw(name) != nullptr) return problem + " here: it belongs to " + full_name(*command);
