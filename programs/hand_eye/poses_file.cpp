@@ -16,6 +16,7 @@ namespace slsd {
 namespace {
 
 constexpr std::string_view kSeparators = ",; \t\r[]";
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // spreadsheets begin UTF-8 with it
 constexpr std::size_t kShownBytes = 40;
 
 std::vector<std::string_view> words_of(std::string_view line) {
@@ -42,6 +43,7 @@ std::optional<double> number_of(std::string_view word) {
 Result<std::vector<PoseLine>> read_poses(std::string_view text, std::string_view name) {
   std::vector<PoseLine> poses;
   bool first = true;
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   for (int number = 1; !text.empty(); ++number) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     const auto words = words_of(text.substr(0, end));

@@ -25,6 +25,13 @@ TEST(ReadPoses, ReadsLinesWithAnySeparator) {
   EXPECT_TRUE(std::isnan((*poses)[3].numbers[0]));
 }
 
+TEST(ReadPoses, PassesOverTheByteOrderMarkOfSpreadsheets) {
+  const auto poses = read_poses("\xef\xbb\xbfpose_00,1,2,3\r\npose_01,4,5,6\r\n", "poses.csv");
+  ASSERT_TRUE(poses) << to_string(poses.error());
+  EXPECT_EQ((*poses)[0].name, "pose_00");
+  EXPECT_THAT((*poses)[1].numbers, ElementsAre(4, 5, 6));
+}
+
 TEST(ReadPoses, NamesTheLineThatIsWrong) {
   const auto message = [](const char* text) {
     const auto poses = read_poses(text, "poses.csv");
