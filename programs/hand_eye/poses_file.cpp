@@ -53,7 +53,9 @@ Result<std::vector<PoseLine>> read_poses(std::string_view text, std::string_view
       return fail(ErrorCode::kMalformed, what, fmt::format("{}:{}", name, number));
     };
     PoseLine pose{std::string(words.front()), {}};
-    const bool heading = std::exchange(first, false) && words.size() > 1 && !number_of(words[1]);
+    const bool heading =
+        std::exchange(first, false) && words.size() > 1 &&
+        std::none_of(words.begin() + 1, words.end(), [](auto word) { return number_of(word).has_value(); });
     if (heading) continue;
     for (const std::string_view word : std::span(words).subspan(1)) {
       const auto value = number_of(word);

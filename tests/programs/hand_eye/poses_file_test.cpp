@@ -38,6 +38,7 @@ TEST(ReadPoses, NamesTheLineThatIsWrong) {
     return poses ? std::string("no error") : to_string(poses.error());
   };
   EXPECT_THAT(message("pose_00,1,2\npose_01,1,two\n"), HasSubstr("poses.csv:2: two is not a number"));
+  EXPECT_THAT(message("pose_00,1l,2\npose_01,1,2\n"), HasSubstr("poses.csv:1: 1l is not a number"));
   EXPECT_THAT(message("pose_00,1,2\npose_00,1,2\n"), HasSubstr("poses.csv:2: pose_00 is given twice"));
   EXPECT_THAT(message("# nothing\n"), HasSubstr("has no pose"));
 }
