@@ -34,7 +34,7 @@ ConfigurationTable file_camera() {
       "camera.file",
       "",
       {{{{"path", R"("frames")", kExample}},
-        "A folder of PNG, TIFF, PGM or PPM images, replayed in the order of their names, or one image. Frames "
+        "A folder of PNG, TIFF, PGM, PPM or JPEG images, replayed in the order of their names, or one image. Frames "
         R"(for scans with texture or ambient light come from its folders "white" and "dark", or those beside the one )"
         "image."},
        {{{"loop", "true"}}, "Start again after the last image. If false, the camera then has no more frames."},

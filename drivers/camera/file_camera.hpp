@@ -25,7 +25,7 @@ namespace slsd {
 struct FileCameraOptions {
   static constexpr std::string_view kDriver = "file";
   std::string name = "camera";
-  std::filesystem::path path = {};  ///< a folder of PNG, TIFF, PGM or PPM images, or one image
+  std::filesystem::path path = {};  ///< a folder of PNG, TIFF, PGM, PPM or JPEG images, or one image
   bool loop = true;                 ///< start again after the last image; else kNotFound
   double rate_hz = 0.0;             ///< 0: exposes at the trigger; else delivers frames in free run, up to 1000
   std::optional<std::pair<int, int>> size_px = {};  ///< expected width and height; empty: those of the first image

@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 6> kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".pnm"};
+constexpr std::array<std::string_view, 8> kExtensions{".png", ".tif", ".tiff", ".pgm", ".ppm", ".pnm", ".jpg", ".jpeg"};
 
 bool is_image_name(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -58,8 +58,8 @@ Result<> ImageFolder::list_folder() {
   }
   if (error) return fail_system(error.value(), "cannot list", path_);
   if (images_.empty())
-    return fail(ErrorCode::kNotFound, "this folder has no PNG, TIFF, PGM or PPM image; record some, or check the path",
-                path_.string());
+    return fail(ErrorCode::kNotFound,
+                "this folder has no PNG, TIFF, PGM, PPM or JPEG image; record some, or check the path", path_.string());
   std::sort(images_.begin(), images_.end(),
             [](const Entry& a, const Entry& b) { return a.path.native() < b.path.native(); });
   return {};

@@ -12,6 +12,7 @@
 
 #include "tests/drivers/allocations.hpp"
 #include "tests/drivers/camera/file_camera_test.hpp"
+#include "tests/drivers/jpeg_bytes.hpp"
 #include "tests/drivers/plain_images.hpp"
 
 namespace slsd {
@@ -30,6 +31,18 @@ TEST_F(FileCameraTest, ReplaysAFolderInTheOrderOfNamesAndBeginsAnew) {
   FileCamera camera(options());
   ASSERT_TRUE(camera.open());
   for (const int expected : {0, 1, 2, 0, 1, 2, 0}) EXPECT_EQ(next(camera), expected);
+}
+
+TEST_F(FileCameraTest, ReplaysJpegAmongOthers) {
+  const std::string jpeg = test::jpeg_bytes(Grey8(12, 8, 45));
+  test::record(folder_, 1);
+  folder_.write("a.jpg", jpeg);
+  folder_.write("b.JPEG", jpeg);
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 4);
+  EXPECT_EQ(next(camera), 4);
+  EXPECT_EQ(next(camera), 0);
 }
 
 TEST_F(FileCameraTest, PassesOverWhatIsNoImage) {
