@@ -238,7 +238,7 @@ CalibrationOutcome report(const Adjustment& adjustment, Observations observation
   if (poses.lacks(PoseSubject::kPlane)) {
     outcome.warnings.push_back("no view of the reference plane could be used, so the calibration uses only the poses");
   }
-  outcome.verdict = judge(outcome);
+  outcome.verdict = judge(outcome, options.depth_min_mm, options.depth_max_mm);
   outcome.calibration.report = file_report(outcome, adjustment);
   return outcome;
 }

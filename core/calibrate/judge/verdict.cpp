@@ -12,6 +12,7 @@ namespace slsd {
 namespace {
 
 constexpr double kDistanceSpread = 1.15;  // ratio of the farthest to the nearest pose
+constexpr double kFarFromRange = 1.5;
 
 class Jury {
  public:
@@ -58,9 +59,24 @@ void judge_poses(const CalibrationOutcome& outcome, Jury& jury) {
   }
 }
 
+// The lengths of boards outside the working range are likely of another unit.
+void judge_distances(const CalibrationOutcome& outcome, double depth_min_mm, double depth_max_mm, Jury& jury) {
+  if (outcome.depth.empty()) return;  // already bad, with its own remedy
+  const auto [nearest, farthest] = std::ranges::minmax(distances_mm(outcome.rig));
+  if (farthest >= depth_min_mm && nearest <= depth_max_mm) return;
+  const bool far = farthest * kFarFromRange < depth_min_mm || nearest > depth_max_mm * kFarFromRange;
+  jury.lower(far ? Grade::kBad : Grade::kUsable);
+  jury.verdict.reasons.push_back(
+      fmt::format("the boards were {:.3g} to {:.3g} mm away, but the working range is {:g} to {:g} mm", nearest,
+                  farthest, depth_min_mm, depth_max_mm));
+  jury.verdict.advice.emplace_back(
+      "give the lengths of --board in millimetres, or set depth_min_mm and depth_max_mm in [decode] to your scanning "
+      "distances");
+}
+
 }  // namespace
 
-Verdict judge(const CalibrationOutcome& outcome) {
+Verdict judge(const CalibrationOutcome& outcome, double depth_min_mm, double depth_max_mm) {
   Jury jury;
   jury.judge(outcome.held_out_corner_px, kHeldOutPx,
              fmt::format("corners of held-out poses are off by {:.2f} px; good is {:.1f} px",
@@ -85,6 +101,7 @@ Verdict judge(const CalibrationOutcome& outcome) {
   }
   judge_coverage(outcome, jury);
   judge_poses(outcome, jury);
+  judge_distances(outcome, depth_min_mm, depth_max_mm, jury);
   if (!outcome.warnings.empty()) jury.lower(Grade::kUsable);
   return jury.verdict;
 }

@@ -9,7 +9,8 @@ namespace slsd {
 
 /// Judges a calibration by its errors on held-out poses, by the uncertainty of depth, and by the poses' coverage of
 /// both images.
+/// @param depth_min_mm, depth_max_mm  the working range, in which at least one of the boards should be
 /// @thread reentrant
-[[nodiscard]] Verdict judge(const CalibrationOutcome& outcome);
+[[nodiscard]] Verdict judge(const CalibrationOutcome& outcome, double depth_min_mm, double depth_max_mm);
 
 }  // namespace slsd

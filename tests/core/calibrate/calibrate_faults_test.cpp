@@ -234,6 +234,18 @@ TEST(Calibrate, CountsRepeatedPosesOnce) {
   EXPECT_NE(outcome->verdict.grade, Grade::kGood);
 }
 
+// A board in centimetres fits as well, with a rig of a tenth of the size.
+TEST(Calibrate, GivesBoardsFarFromTheWorkingRangeABadVerdict) {
+  Observations observations = see(true_rig(), true_poses(12));
+  for (PoseObservation& pose : observations.poses)
+    for (BoardPoint& corner : pose.views[0].corners) corner.board_mm /= 10;
+  const auto outcome = calibrate(observations, {});
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(outcome->verdict.grade, Grade::kBad);
+  EXPECT_THAT(outcome->verdict.reasons, testing::Contains(HasSubstr("mm away, but the working range is")));
+  EXPECT_THAT(outcome->verdict.advice, testing::Contains(HasSubstr("lengths of --board in millimetres")));
+}
+
 TEST(Calibrate, NamesClippedPoses) {
   Observations observations = see(true_rig(), true_poses(12));
   observations.poses[2].views[0].clipped_share = 0.82;
