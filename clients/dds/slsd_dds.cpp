@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
+#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <future>
 #include <optional>
 #include <string>
+#include <thread>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -36,6 +39,19 @@ slsd::Result<slsd::dds::Network> join(slsd::dds::NetworkOptions network, std::st
   if (!doubt.empty()) network.discovery.warnings.push_back(std::move(doubt));
   for (const std::string& warning : network.discovery.warnings) std::fprintf(stderr, "slsd-dds: %s\n", warning.c_str());
   return slsd::dds::Network::open(network);
+}
+
+/// Leaves the networks. Does not wait for long: Fast DDS 2.9 may wait for itself when it deletes what others look at.
+void leave_in_time() {
+  constexpr std::chrono::seconds kLongest(10);
+  std::promise<void> left;
+  std::future<void> leaving = left.get_future();
+  std::thread([&left] {
+    slsd::dds::leave_networks();
+    left.set_value();
+  }).detach();
+  if (leaving.wait_for(kLongest) != std::future_status::ready)
+    std::fprintf(stderr, "slsd-dds: ends without leaving the network in order: others notice within half a minute\n");
 }
 
 int print_pose(const slsd::dds::NetworkOptions& options, const slsd::dds::RobotFrames& frames) {
@@ -161,6 +177,6 @@ int main(int argc, char** argv) {
   if (!merged) return failed(merged.error());
   int signal = 0;
   sigwait(&ends, &signal);
-  slsd::dds::leave_networks();
+  leave_in_time();
   std::_Exit(0);  // its threads may be waiting for the service
 }

@@ -16,7 +16,7 @@ def main(out, count, box):
     with slsd.Scanner() as scanner, slsd.Model(scanner) as model:
         for i in range(count):
             input(f"view {i + 1} of {count}: ")
-            cloud = scanner.scan(density="pixels", coordinate_frame="rig", timeout_s=60)
+            cloud = scanner.scan(density="pixels", coordinate_frame="rig", stride=1, voxel_mm=0, timeout_s=60)
             if len(cloud) == 0:
                 print(f"no points, so this view is left out: {cloud.why_empty}")
                 continue
