@@ -139,7 +139,7 @@ TEST_F(CalibrationSession, TakesTheReferencePlaneAfterThePoses) {
   ASSERT_EQ(poses_->size(), 2u) << out_.str();
   EXPECT_EQ(poses_->observations().poses[1].name, "plane_01");
   EXPECT_EQ(poses_->observations().poses[1].subject, PoseSubject::kPlane);
-  EXPECT_THAT(out_.str(), HasSubstr("next: hold the reference plane near"));
+  EXPECT_THAT(out_.str(), HasSubstr("next: hold the reference plane at your nearest"));
   EXPECT_THAT(out_.str(), HasSubstr("plane 1 of 2: "));
   EXPECT_THAT(out_.str(), HasSubstr("1 more; next: hold the reference plane in the middle"));
   EXPECT_TRUE(std::filesystem::exists(folder_.path() / "pose_00" / "white.png"));
