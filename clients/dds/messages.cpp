@@ -3,7 +3,6 @@
 #include "messages.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -13,6 +12,8 @@
 #include <utility>
 
 #include <Eigen/Geometry>
+
+#include "core/cloud/cube_grid.hpp"
 
 namespace slsd::dds {
 namespace {
@@ -28,30 +29,16 @@ Pixel pixel_of(const client::Point& point, const CalibratedCamera& camera) {
   return {static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y()))};
 }
 
-constexpr double kSmallestCubeMm = 1e-6;  // holds one point, as floats are coarser; its numbers fit into 64 bits
-
 /// Keeps the first point in each cube.
 class VoxelGrid {
  public:
-  explicit VoxelGrid(double size_mm) : size_mm_(std::max(size_mm, kSmallestCubeMm)) {}
+  explicit VoxelGrid(double side_mm) : grid_(side_mm) {}
   bool take(const client::Point& point) {
-    const auto cell = [&](float value) { return static_cast<std::int64_t>(std::floor(value / size_mm_)); };
-    return taken_.insert({cell(point.x), cell(point.y), cell(point.z)}).second;
+    return taken_.insert(grid_.at(Eigen::Vector3f(point.x, point.y, point.z).cast<double>())).second;
   }
 
  private:
-  using Cube = std::array<std::int64_t, 3>;
-  struct CubeHash {
-    std::size_t operator()(const Cube& cube) const {
-      std::uint64_t mixed = 0;
-      for (const std::int64_t number : cube) {
-        mixed = (mixed + static_cast<std::uint64_t>(number)) * 0x9e3779b97f4a7c15U;
-        mixed ^= mixed >> 29U;
-      }
-      return mixed;
-    }
-  };
-  double size_mm_;
+  CubeGrid grid_;
   std::unordered_set<Cube, CubeHash> taken_;
 };
 

@@ -3,40 +3,22 @@
 #include "core/dense/cloud/part_of_cloud.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <unordered_map>
+
+#include "core/cloud/cube_grid.hpp"
 
 namespace slsd {
 namespace {
 
-struct Cube {
-  std::int64_t x, y, z;
-  friend bool operator==(const Cube&, const Cube&) = default;
-};
-
-struct CubeHash {
-  std::size_t operator()(const Cube& cube) const {
-    const auto mix = [](std::uint64_t value) { return (value ^ (value >> 29U)) * 0x9e3779b97f4a7c15U; };
-    return mix(static_cast<std::uint64_t>(cube.x) +
-               mix(static_cast<std::uint64_t>(cube.y) + mix(static_cast<std::uint64_t>(cube.z))));
-  }
-};
-
-constexpr double kSmallestSideMm = 1e-6;  // holds one point, as floats are coarser; its numbers fit into 64 bits
-
 // Finds the most certain point of each cube.
 class CubesOfPoints {
  public:
-  explicit CubesOfPoints(double side_mm) : side_mm_(std::max(side_mm, kSmallestSideMm)) {}
+  explicit CubesOfPoints(double side_mm) : grid_(side_mm) {}
 
   /// @param index  of the point
   /// @return the index of the point that gives way, which may be this one; nothing if the cube was empty
   std::optional<std::size_t> offer(const Eigen::Vector3d& point, float sigma_mm, std::size_t index) {
-    const Eigen::Vector3d cube = (point / side_mm_).array().floor();
-    const Cube key{static_cast<std::int64_t>(cube.x()), static_cast<std::int64_t>(cube.y()),
-                   static_cast<std::int64_t>(cube.z())};
-    const auto [found, empty] = best_.try_emplace(key, Best{sigma_mm, index});
+    const auto [found, empty] = best_.try_emplace(grid_.at(point), Best{sigma_mm, index});
     if (empty) return std::nullopt;
     if (!(sigma_mm < found->second.sigma_mm)) return index;
     const std::size_t before = found->second.index;
@@ -49,7 +31,7 @@ class CubesOfPoints {
     float sigma_mm;
     std::size_t index;
   };
-  double side_mm_;
+  CubeGrid grid_;
   std::unordered_map<Cube, Best, CubeHash> best_;
 };
 
