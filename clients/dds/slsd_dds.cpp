@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -41,17 +42,18 @@ slsd::Result<slsd::dds::Network> join(slsd::dds::NetworkOptions network, std::st
   return slsd::dds::Network::open(network);
 }
 
-/// Leaves the networks. Does not wait for long: Fast DDS 2.9 may wait for itself when it deletes what others look at.
+/// Leaves the networks, in ten seconds at most: it waits for writes under way and for Fast DDS, which has no limit.
 void leave_in_time() {
   constexpr std::chrono::seconds kLongest(10);
   std::promise<void> left;
   std::future<void> leaving = left.get_future();
-  std::thread([&left] {
+  std::thread([left = std::move(left)]() mutable {  // may outlive this function
     slsd::dds::leave_networks();
     left.set_value();
-  }).detach();
+  })
+      .detach();
   if (leaving.wait_for(kLongest) != std::future_status::ready)
-    std::fprintf(stderr, "slsd-dds: ends without leaving the network in order: others notice within half a minute\n");
+    std::fprintf(stderr, "slsd-dds: ends without leaving the network in order: others notice when its lease ends\n");
 }
 
 int print_pose(const slsd::dds::NetworkOptions& options, const slsd::dds::RobotFrames& frames) {
