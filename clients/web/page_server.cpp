@@ -495,11 +495,8 @@ Answer PageServer::cloud(const Request& request) {
 
 Answer PageServer::scan(const json& body) {
   json params{{"format", "ply"}, {"coordinate_frame", "rig"}, {"timeout_ms", 60'000}, {"transport", "memfd"}};
-  for (const auto& [key, value] : body.items()) {
-    if (std::ranges::find(kScanKeys, key) == kScanKeys.end())
-      return refusal(400, "invalid_params", "no such parameter: \"" + printable(key, 64) + "\"");
-    params[key] = value;
-  }
+  if (auto unknown = unknown_parameter(body, {kScanKeys.begin(), kScanKeys.end()})) return std::move(*unknown);
+  params.update(body);
   // Organised, because a PLY of pixels does not contain their positions; the page makes both files from it.
   if (params.value("density", json()) == "pixels") params["format"] = "pcd";
   auto answered = call("scan", params, kTimeout);
