@@ -13,7 +13,7 @@ std::vector<Clone> clones_here() {
   if (has_avx2) here.push_back(Clone::kAvx2);
   const bool has_fma = has_avx2 && __builtin_cpu_supports("fma");
   if (has_fma) here.push_back(Clone::kAvx2Fma);
-  // No loop uses VBMI2. Processors without it, of before 2019, slow down while they use wide registers.
+  // No loop uses VBMI2. Intel's processors without it (Skylake, Cascade Lake) slow down while they use wide registers.
   if (has_fma && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
       __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq") &&
       __builtin_cpu_supports("avx512vbmi2")) {
