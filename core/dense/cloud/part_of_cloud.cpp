@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #include "core/dense/cloud/part_of_cloud.hpp"
 
-#include <algorithm>
 #include <unordered_map>
 
 #include "core/cloud/cube_grid.hpp"
