@@ -9,6 +9,7 @@
 
 #include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
+#include "clients/slsctl/report.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/geometry/plane_fit.hpp"
 
