@@ -4,6 +4,7 @@
 
 #include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
+#include "clients/slsctl/report.hpp"
 #include "core/printable.hpp"
 #include "daemon/rpc/message.hpp"
 
