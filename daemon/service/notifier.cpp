@@ -11,20 +11,24 @@ void Notifier::starting(const std::string& status, std::chrono::microseconds tim
 }
 
 void Notifier::ready(const std::string& status) const {
+  if (stopping_) return;
   sd_notifyf(0, "READY=1\nSTATUS=%s", status.c_str());
 }
 
 void Notifier::status(const std::string& status) const {
+  if (stopping_) return;
   sd_notifyf(0, "STATUS=%s", status.c_str());
 }
 
 void Notifier::reloading() const {
+  if (stopping_) return;
   const auto now = std::chrono::steady_clock::now().time_since_epoch();
   const auto now_us = std::chrono::duration_cast<std::chrono::microseconds>(now).count();
   sd_notifyf(0, "RELOADING=1\nMONOTONIC_USEC=%lld", static_cast<long long>(now_us));
 }
 
-void Notifier::stopping() const {
+void Notifier::stopping() {
+  stopping_ = true;
   sd_notify(0, "STOPPING=1\nSTATUS=stopping");
 }
 

@@ -8,7 +8,8 @@
 
 namespace slsd {
 
-/// Reports the service's state to the service manager with sd_notify(3). Does nothing without NOTIFY_SOCKET.
+/// Reports the service's state to the service manager with sd_notify(3). Does nothing without NOTIFY_SOCKET. After
+/// stopping() it reports no other state: a reload that ends then would call the service ready.
 /// @thread thread-bound
 class Notifier {
  public:
@@ -18,11 +19,14 @@ class Notifier {
   void ready(const std::string& status) const;
   void status(const std::string& status) const;
   void reloading() const;
-  void stopping() const;
+  void stopping();
   void ping_watchdog() const;
 
   /// The interval within which the manager expects a ping. Empty if it does not watch.
   [[nodiscard]] static std::optional<std::chrono::microseconds> watchdog_time();
+
+ private:
+  bool stopping_ = false;
 };
 
 }  // namespace slsd

@@ -105,7 +105,7 @@ class Life(unittest.TestCase):
         with Service() as service:
             second = slsd("--config", service.file)
             self.assertEqual(second.returncode, 1)
-            self.assertIn("another daemon already listens here", second.stderr)
+            self.assertIn(f"{service.socket}: another service runs here", second.stderr)
             with service.client() as client:
                 self.assertIn("version", client.call("status")[0])
 
@@ -213,6 +213,28 @@ class Life(unittest.TestCase):
                     await_message("STOPPING=1")
                 finally:
                     service.__exit__()
+
+    def test_manager_hears_of_no_reload_that_ends_during_the_stop(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "notify")
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
+                manager.bind(path)
+                manager.settimeout(600)
+                service = Service(environment={"NOTIFY_SOCKET": path})
+                with service:
+                    service.wait_ready()
+                    # Another pattern takes the service a while: it computes the codebook and the decoders again.
+                    text = service.file.read_text(encoding="utf-8")
+                    service.file.write_text(text.replace(f'file = "{SCENE}/pattern.toml"', "symbol_size_px = 8"), encoding="utf-8")
+                    service.send_signal(signal.SIGHUP)
+                    while "RELOADING=1" not in manager.recv(4096).decode():
+                        pass
+                    self.assertEqual(service.stop()[0], 0)
+                while "STOPPING=1" not in manager.recv(4096).decode():
+                    pass
+                manager.setblocking(False)
+                with self.assertRaises(BlockingIOError):
+                    self.fail(manager.recv(4096).decode())
 
     def test_manager_is_told_why_nothing_starts(self):
         with tempfile.TemporaryDirectory() as folder:
