@@ -3,15 +3,18 @@
 #include "daemon/server/listening_socket.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <optional>
+#include <thread>
 
 #include <systemd/sd-daemon.h>
 
@@ -23,6 +26,10 @@ namespace {
 
 using std::filesystem::path;
 
+using namespace std::chrono_literals;
+
+constexpr auto kLockTime = 2s;  // others hold the lock for less than a millisecond
+constexpr auto kLockPause = 1ms;
 constexpr int kBacklog = 4096;  // room for many short connections while the loop is busy; the kernel may allow fewer
 
 sockaddr_un address_of(const path& path) {
@@ -56,11 +63,26 @@ Result<> check_free(const path& path) {
   const int connected = ::connect(probe.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address);
   // A full backlog (EAGAIN) is a sign of life too.
   if (connected == 0 || errno == EAGAIN) {
-    return fail(ErrorCode::kBusy, "another daemon already listens here: stop it, or choose another path",
-                path.string());
+    return fail(ErrorCode::kBusy, "another service runs here: stop it, or choose another path", path.string());
   }
   return errno == ECONNREFUSED ? Result<>()
-                               : fail_system(errno, "cannot tell whether another daemon listens here", path.string());
+                               : fail_system(errno, "cannot tell whether another service runs here", path.string());
+}
+
+// Locks a folder until the descriptor ends, or its process: of services that start at once, one at a time looks for
+// others and takes the path. A folder that cannot be read, or a file system without locks, gives none.
+Result<FileDescriptor> lock(const path& folder) {
+  FileDescriptor locked(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  const auto end = std::chrono::steady_clock::now() + kLockTime;
+  while (locked && ::flock(locked.number(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK && errno != EINTR) return FileDescriptor();
+    if (std::chrono::steady_clock::now() > end)
+      return fail(ErrorCode::kBusy,
+                  "a process locks the socket's folder: end it (lslocks names it), or choose another folder",
+                  folder.string());
+    std::this_thread::sleep_for(kLockPause);
+  }
+  return locked;
 }
 
 constexpr std::string_view kTemporary = ".slsd-";  // the process id follows
@@ -154,6 +176,8 @@ Result<ListeningSocket> ListeningSocket::open(const path& path, int mode) {
   auto inherited = handed_over(path);
   if (!inherited) return tl::unexpected(inherited.error());
   if (*inherited) return ListeningSocket(std::move(**inherited), {}, 0);
+  const auto locked = lock(folder_of(path));
+  if (!locked) return tl::unexpected(locked.error());
   if (auto usable = check_socket_path(path); !usable) return tl::unexpected(usable.error());
   remove_left_behind(folder_of(path));
   const FileDescriptor folder(::open(folder_of(path).c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
@@ -170,7 +194,9 @@ Result<ListeningSocket> ListeningSocket::open(const path& path, int mode) {
 
 ListeningSocket::~ListeningSocket() {
   struct stat status {};
-  if (path_.empty() || ::lstat(path_.c_str(), &status) != 0) return;
+  if (path_.empty()) return;
+  const auto locked = lock(folder_of(path_));  // a service that starts now may be about to take the path
+  if (!locked || ::lstat(path_.c_str(), &status) != 0) return;
   if (status.st_ino == inode_) ::unlink(path_.c_str());
 }
 

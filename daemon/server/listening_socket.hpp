@@ -17,9 +17,9 @@ class ListeningSocket {
  public:
   /// Listens at the path. Uses the socket that systemd hands over, if any (sd_listen_fds(3)). It has the mode and owner
   /// of its unit, and remains after this object. Otherwise makes a socket, replacing one of a dead daemon. Its path
-  /// appears with the right mode, and only once connections are accepted.
+  /// appears with the right mode, and only once connections are accepted. If several start at once, one gets the path.
   /// @param mode  as for chmod
-  /// @errors kInvalidArgument: longer than kMaxSocketPath; kBusy: a daemon answers there; kAlreadyExists: the path is
+  /// @errors kInvalidArgument: longer than kMaxSocketPath; kBusy: a service runs there; kAlreadyExists: the path is
   ///         not a socket; kMismatch: systemd listens elsewhere; kNotFound: no such folder; kPermissionDenied;
   ///         kNoSpace; kIo
   [[nodiscard]] static Result<ListeningSocket> open(const std::filesystem::path& path, int mode);
@@ -37,7 +37,7 @@ class ListeningSocket {
 
   FileDescriptor socket_;
   std::filesystem::path path_;  ///< empty once moved from, or if the socket is systemd's
-  ino_t inode_;                 ///< distinguishes our socket from another daemon's at the path, which must stay
+  ino_t inode_;                 ///< distinguishes our socket from another service's at the path, which must stay
 };
 
 /// Checks that a socket can be opened at the path, without opening one. @errors as ListeningSocket::open()

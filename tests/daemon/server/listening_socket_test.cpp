@@ -3,16 +3,21 @@
 #include "daemon/server/listening_socket.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -35,6 +40,63 @@ class ListeningSocketTest : public ::testing::Test {
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
   path folder_;
+};
+
+/// Binds and listens as another service would. @return none: the path is taken
+FileDescriptor listener_at(const path& path) {
+  FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);
+  const bool listens = ::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 &&
+                       ::listen(socket.number(), 1) == 0;
+  return listens ? std::move(socket) : FileDescriptor();
+}
+
+/// Processes that open the same socket at the same moment, and keep it until the object ends.
+class Starters {
+ public:
+  Starters(const path& socket, int count) {
+    EXPECT_EQ(::pipe(start_.data()), 0);
+    EXPECT_EQ(::pipe(told_.data()), 0);
+    for (int i = 0; i < count; ++i) {
+      const pid_t child = ::fork();
+      if (child == 0) start(socket);
+      children_.push_back(child);
+    }
+  }
+  ~Starters() {
+    for (const pid_t child : children_) {
+      ::kill(child, SIGKILL);
+      ::waitpid(child, nullptr, 0);
+    }
+    for (const int end : {start_[0], start_[1], told_[0], told_[1]}) ::close(end);
+  }
+  Starters(const Starters&) = delete;
+  Starters& operator=(const Starters&) = delete;
+
+  /// Starts all. @return for each 'w' if it listens, 'b' if it found another, 'x' for another error; sorted
+  [[nodiscard]] std::string outcomes() {
+    const std::string go(children_.size(), '!');
+    EXPECT_EQ(::write(start_[1], go.data(), go.size()), static_cast<ssize_t>(go.size()));
+    std::string outcomes(children_.size(), '?');
+    for (char& outcome : outcomes) EXPECT_EQ(::read(told_[0], &outcome, 1), 1);
+    std::ranges::sort(outcomes);
+    return outcomes;
+  }
+
+ private:
+  [[noreturn]] void start(const path& socket) {
+    char outcome = 'x';
+    if (::read(start_[0], &outcome, 1) != 1) ::_exit(1);
+    const auto listening = ListeningSocket::open(socket, 0600);
+    outcome = listening ? 'w' : listening.error().code == ErrorCode::kBusy ? 'b' : 'x';
+    if (::write(told_[1], &outcome, 1) != 1) ::_exit(1);
+    for (;;) ::pause();
+  }
+
+  std::array<int, 2> start_{}, told_{};
+  std::vector<pid_t> children_;
 };
 
 TEST_F(ListeningSocketTest, TakesConnectionsAndGoesWithItsObject) {
@@ -67,6 +129,40 @@ TEST_F(ListeningSocketTest, ReplacesADeadOne) {
   }
   std::filesystem::rename(folder_ / "kept", socket);
   EXPECT_TRUE(ListeningSocket::open(socket, 0600));
+}
+
+TEST_F(ListeningSocketTest, GivesThePathToOneOfSeveralThatStartAtOnce) {
+  for (int round = 0; round < 20; ++round) {
+    const path socket = folder_ / "s";  // the killed ones of the round before leave a dead socket
+    Starters starters(socket, 4);
+    EXPECT_EQ(starters.outcomes(), "bbbw");
+    EXPECT_TRUE(Connection::open(socket));
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 1);
+  }
+}
+
+TEST_F(ListeningSocketTest, WaitsForAnotherThatIsStarting) {
+  const FileDescriptor starting(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  ASSERT_EQ(::flock(starting.number(), LOCK_EX), 0);
+  auto second = std::async(std::launch::async, [&] { return ListeningSocket::open(folder_ / "s", 0600); });
+  const FileDescriptor first = listener_at(folder_ / "s");
+  ASSERT_TRUE(first);
+  ASSERT_EQ(::flock(starting.number(), LOCK_UN), 0);
+  const auto refused = second.get();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
+  EXPECT_THAT(refused.error().message, ::testing::HasSubstr("another service runs here"));
+  EXPECT_EQ(refused.error().where, folder_ / "s");
+}
+
+TEST_F(ListeningSocketTest, DoesNotWaitForeverForAnotherThatIsStarting) {
+  const FileDescriptor starting(::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  ASSERT_EQ(::flock(starting.number(), LOCK_EX), 0);
+  const auto refused = ListeningSocket::open(folder_ / "s", 0600);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kBusy);
+  EXPECT_THAT(refused.error().message, ::testing::HasSubstr("a process locks the socket's folder"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "s"));
 }
 
 TEST_F(ListeningSocketTest, LeavesWhatIsNoSocketAlone) {
@@ -111,11 +207,7 @@ TEST_F(ListeningSocketTest, RemovesWhatADaemonThatWasKilledLeft) {
   ::waitpid(dead, nullptr, 0);
   for (const std::string& name : {".slsd-" + std::to_string(dead), ".slsd-" + std::to_string(::getppid())}) {
     ASSERT_TRUE(ListeningSocket::open(folder_ / "other", 0600));
-    const FileDescriptor socket(::socket(AF_UNIX, SOCK_STREAM, 0));
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::strncpy(address.sun_path, (folder_ / name).c_str(), sizeof address.sun_path - 1);
-    ASSERT_EQ(::bind(socket.number(), reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    ASSERT_TRUE(listener_at(folder_ / name));
   }
   std::ofstream(folder_ / (".slsd-" + std::to_string(dead) + "x")) << "a file of somebody";
   ASSERT_TRUE(ListeningSocket::open(folder_ / "s", 0600));
