@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""The blocks of README.md and docs/installing.md that need no installation run as they are written; the others are sound
-shell. `./run newcomer` runs them all. Every file and function that docs/architecture.md names is there."""
+"""The blocks of PAGES that need no installation run as they are written; the others are sound shell. `./run newcomer` runs
+them all but those of docs/protocol.md. Every file and function that docs/architecture.md names is there."""
 import os
 import pathlib
 import re
@@ -17,7 +17,8 @@ BIN = pathlib.Path(os.environ["SLSD_BIN"])
 sys.path.append(str(SOURCE / "tests/machine"))
 from blocks import blocks_of, fits, session_of
 
-BLOCKS = [block for page in ("README.md", "docs/installing.md")
+PAGES = ("README.md", "docs/installing.md", "docs/developing.md", "docs/protocol.md")
+BLOCKS = [block for page in PAGES
           for block in blocks_of(page, (SOURCE / page).read_text(encoding="utf-8"))]
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Runs every block of README.md and docs/installing.md as it is written, each page in an empty Debian, as a user who has sudo:
+"""Runs every block of PAGES as it is written, each page in an empty Debian, as a user who has sudo:
 newcomer.py ROOT SOURCES [--quick] [--from PLACE] [--packages DIR]. As root. ROOT is a Debian with systemd and sudo; SOURCES a clone."""
 import argparse
 import contextlib
@@ -17,7 +17,7 @@ import time
 from blocks import blocks_of, fits, session_of
 from machine import Container, require
 
-PAGES = ("README.md", "docs/installing.md")
+PAGES = ("README.md", "docs/installing.md", "docs/developing.md")
 USER, HOME = "newcomer", "/home/newcomer"
 TIMEOUT_S = 4 * 3600
 # What stands for the devices that the reader writes into the configuration.
