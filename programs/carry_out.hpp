@@ -10,7 +10,7 @@
 
 #include "clients/usage/usage.hpp"
 #include "core/result.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 

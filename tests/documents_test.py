@@ -99,7 +99,7 @@ class Documents(unittest.TestCase):
 
 
 class Map(unittest.TestCase):
-    ROOMS = ("bench", "clients", "config", "core", "daemon", "docs", "drivers", "man", "picture", "programs", "systemd", "tests")
+    ROOMS = ("bench", "clients", "config", "core", "daemon", "docs", "drivers", "man", "picture", "programs", "rpc", "systemd", "tests")
 
     @classmethod
     def setUpClass(cls):

@@ -8,20 +8,20 @@ import sys
 import unittest
 
 SOURCE = pathlib.Path(__file__).resolve().parents[1]
-TOPS = ("core", "picture", "drivers", "daemon", "clients", "programs")
+TOPS = ("core", "picture", "drivers", "rpc", "daemon", "clients", "programs")
 INCLUDE_FOLDERS = (SOURCE, SOURCE / "clients/cpp/include")
 BASE = {"core", "picture", "drivers"}
-PROTOCOL = {"daemon/rpc"}  # all that a client knows of the service
+PROTOCOL = {"rpc"}  # all that a client knows of the service
 BELOW = {
     "core": set(),
     "picture": {"core"},
     "drivers": {"core"},
+    "rpc": {"core"},
     "daemon/configuration": BASE,
-    "daemon/rpc": BASE,
     "daemon/scan": BASE | {"daemon/configuration"},
-    "daemon/server": BASE | {"daemon/configuration", "daemon/scan", "daemon/rpc"},
+    "daemon/server": BASE | PROTOCOL | {"daemon/configuration", "daemon/scan"},
     "daemon/bundle": BASE | PROTOCOL | {"daemon/configuration", "daemon/scan", "daemon/server"},
-    "daemon/service": BASE | {"daemon/configuration", "daemon/scan", "daemon/rpc", "daemon/server", "daemon/bundle"},
+    "daemon/service": BASE | PROTOCOL | {"daemon/configuration", "daemon/scan", "daemon/server", "daemon/bundle"},
     "clients/cpp": set(),
     "clients/usage": {"core"},
     "clients/connection": BASE | PROTOCOL | {"clients/cpp"},
@@ -33,8 +33,8 @@ BELOW = {
     "clients/model": BASE | PROTOCOL | {"clients/cpp", "clients/usage", "clients/connection"},
     "clients/dds": BASE | {"clients/cpp", "clients/usage"},
     "programs/latency": BASE | {"daemon/configuration"},
-    "programs/calibrate": BASE | {"daemon/configuration", "daemon/scan", "daemon/rpc", "clients/cpp",
-                                  "clients/connection", "programs/latency"},
+    "programs/calibrate": BASE | PROTOCOL | {"daemon/configuration", "daemon/scan", "clients/cpp",
+                                             "clients/connection", "programs/latency"},
     "programs/hand_eye": BASE | {"clients/usage", "daemon/configuration", "daemon/scan", "programs/calibrate"},
     "programs/datasheet": BASE | PROTOCOL | {"clients/usage", "clients/cpp", "clients/connection"},
     "programs/verify": BASE | {"daemon/configuration", "daemon/scan", "programs/calibrate"},

@@ -4,7 +4,7 @@
 # Checks format, wording, scripts and code.
 
 formatter=clang-format-14  # other versions break lines elsewhere
-linted_rooms=(core picture drivers daemon clients/{connection,usage,slsctl} programs)
+linted_rooms=(core picture drivers rpc daemon clients/{connection,usage,slsctl} programs)
 
 sources() { git ls-files '*.hpp' '*.cpp'; }
 check_format() { sources | xargs "$formatter" --dry-run -Werror; }

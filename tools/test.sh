@@ -92,7 +92,7 @@ do_test() {
 
 # For sanitize --quick: rooms that share memory between threads, parse what strangers send, or hold devices. Core
 # computes, which is slow under a sanitizer. Paced cameras, hung X servers and soaks take long and find little.
-quick_rooms='^(drivers(/projector)?|daemon|clients|programs)$'
+quick_rooms='^(drivers(/projector)?|rpc|daemon|clients|programs)$'
 quick_tests='^(daemon\.(make_scene|service|waiting|logging|rubbish|subscribe|life|command_line|project|record|texture)$|[A-Z])'
 quick_passed_over='(/(CameraContract|ProjectorContract)\.|Latency|Soak|Pace|Calibrat|Session\.|LateLight|OnXvfb\.|OnTwoMonitors\.)'
 
@@ -136,7 +136,7 @@ do_coverage() {
   build coverage
   run_tests coverage
   mkdir -p out/coverage
-  gcovr --root . --filter core/ --filter picture/ --filter drivers/ --filter daemon/ --filter clients/slsctl/ \
-    --filter clients/connection/ --filter clients/usage/ --filter programs/ --exclude-throw-branches \
+  gcovr --root . --filter core/ --filter picture/ --filter drivers/ --filter rpc/ --filter daemon/ \
+    --filter clients/slsctl/ --filter clients/connection/ --filter clients/usage/ --filter programs/ --exclude-throw-branches \
     --html-details out/coverage/index.html --txt - build/coverage
 }

@@ -13,10 +13,10 @@
 
 #include "clients/connection/passing.hpp"
 #include "core/calibration_file/calibration_file.hpp"
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/recording/layout.hpp"
 #include "drivers/system/system_error.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd::model {
 namespace {

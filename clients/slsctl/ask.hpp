@@ -10,7 +10,7 @@
 #include "clients/connection/connection.hpp"
 #include "clients/slsctl/client_options.hpp"
 #include "core/result.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 

@@ -9,8 +9,8 @@
 #include "clients/connection/connection.hpp"
 #include "core/cloud/ply.hpp"
 #include "core/image_size.hpp"
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/read_image.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

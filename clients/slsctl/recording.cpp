@@ -5,10 +5,10 @@
 #include <cerrno>
 #include <system_error>
 
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/system/system_error.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

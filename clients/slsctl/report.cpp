@@ -11,7 +11,7 @@
 #include "clients/slsctl/output.hpp"
 #include "core/calibrate/watch/drift_watch.hpp"
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

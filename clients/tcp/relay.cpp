@@ -14,8 +14,8 @@
 #include <asio/buffer.hpp>
 #include <asio/write.hpp>
 
-#include "daemon/rpc/message.hpp"
 #include "drivers/system/file_descriptor.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd::tcp {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "daemon/rpc/message.hpp"
-#include "daemon/rpc/param_reader.hpp"
+#include "rpc/message.hpp"
+#include "rpc/param_reader.hpp"
 
 namespace slsd::tcp {
 namespace {

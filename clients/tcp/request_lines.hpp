@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
-#include "daemon/rpc/line_buffer.hpp"
-#include "daemon/rpc/request.hpp"
+#include "rpc/line_buffer.hpp"
+#include "rpc/request.hpp"
 
 namespace slsd::tcp {
 

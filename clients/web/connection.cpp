@@ -15,7 +15,7 @@
 #include <boost/beast/http/write.hpp>
 
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd::web {
 namespace {

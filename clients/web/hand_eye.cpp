@@ -21,10 +21,10 @@
 #include "core/geometry/robot_pose.hpp"
 #include "core/printable.hpp"
 #include "core/result.hpp"
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/system/file_descriptor.hpp"
 #include "drivers/system/own_program.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd::web {
 namespace {

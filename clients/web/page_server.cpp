@@ -20,9 +20,9 @@
 #include "core/nearest_name.hpp"
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
-#include "daemon/rpc/message.hpp"
-#include "daemon/rpc/request.hpp"
 #include "drivers/files/file.hpp"
+#include "rpc/message.hpp"
+#include "rpc/request.hpp"
 
 namespace slsd::web {
 namespace {

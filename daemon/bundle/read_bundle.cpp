@@ -7,7 +7,7 @@
 #include "core/geometry/robot_pose.hpp"
 #include "core/printable.hpp"
 #include "daemon/bundle/bundle.hpp"
-#include "daemon/rpc/request.hpp"
+#include "rpc/request.hpp"
 
 namespace slsd {
 namespace {

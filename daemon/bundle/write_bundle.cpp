@@ -11,11 +11,11 @@
 #include "core/shown_picture.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/bundle/bundle.hpp"
-#include "daemon/rpc/message.hpp"
 #include "daemon/scan/cloud/frame_image.hpp"
 #include "daemon/server/methods/scan_json.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/recording/layout.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

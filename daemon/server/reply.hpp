@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <tl/expected.hpp>
 
-#include "daemon/rpc/message.hpp"
 #include "daemon/scan/cloud/cloud_files.hpp"
 #include "daemon/server/lent_memory.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 

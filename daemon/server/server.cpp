@@ -12,7 +12,7 @@
 #include <spdlog/spdlog.h>
 #include <asio/post.hpp>
 
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

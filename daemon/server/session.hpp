@@ -18,13 +18,13 @@
 
 #include "daemon/configuration/access.hpp"
 #include "daemon/configuration/server_options.hpp"
-#include "daemon/rpc/line_buffer.hpp"
-#include "daemon/rpc/request.hpp"
 #include "daemon/server/lent_memory.hpp"
 #include "daemon/server/memory_budget.hpp"
 #include "daemon/server/reply.hpp"
 #include "daemon/server/subscription.hpp"
 #include "daemon/server/turns.hpp"
+#include "rpc/line_buffer.hpp"
+#include "rpc/request.hpp"
 
 namespace slsd {
 

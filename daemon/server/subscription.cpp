@@ -4,8 +4,8 @@
 
 #include <utility>
 
-#include "daemon/rpc/message.hpp"
 #include "daemon/server/methods/scan_json.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 

@@ -18,7 +18,7 @@ import unittest
 CMAKE, BUILD = sys.argv[1:3]
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 # Whose messages, comments and pages of the manual a user reads.
-NAMING = ("core", "daemon", "drivers", "picture", "clients", "config", "man", "systemd")
+NAMING = ("core", "daemon", "drivers", "picture", "rpc", "clients", "config", "man", "systemd")
 PAGE = re.compile(r"\bdocs/[a-z_-]+\.md\b")
 UNITS = ("slsd.service", "slsd.socket", "slsd@.service", "slsd@.socket", "slsd-display.service", "slsd-web.service", "slsd-tcp.service",
          "slsd-metrics.service", "slsd-metrics.timer")

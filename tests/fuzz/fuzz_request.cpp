@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <string_view>
 
-#include "daemon/rpc/line_buffer.hpp"
-#include "daemon/rpc/message.hpp"
-#include "daemon/rpc/param_reader.hpp"
-#include "daemon/rpc/request.hpp"
+#include "rpc/line_buffer.hpp"
+#include "rpc/message.hpp"
+#include "rpc/param_reader.hpp"
+#include "rpc/request.hpp"
 
 namespace {
 

@@ -6,8 +6,8 @@
 #include <cstdio>
 #include <utility>
 
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd::model {
 namespace {

@@ -8,7 +8,7 @@
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/report.hpp"
 #include "core/utc_text.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 

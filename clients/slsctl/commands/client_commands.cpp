@@ -10,8 +10,8 @@
 #include "clients/slsctl/report.hpp"
 #include "core/base64.hpp"
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/file.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

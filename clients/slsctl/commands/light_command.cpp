@@ -10,9 +10,9 @@
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/report.hpp"
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "picture/draw_light.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

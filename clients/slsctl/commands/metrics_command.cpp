@@ -6,7 +6,7 @@
 #include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/report.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 

@@ -6,7 +6,7 @@
 #include "clients/slsctl/output.hpp"
 #include "clients/slsctl/report.hpp"
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

@@ -13,8 +13,8 @@
 #include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/recording.hpp"
 #include "clients/slsctl/report.hpp"
-#include "daemon/rpc/message.hpp"
 #include "drivers/system/interrupt.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

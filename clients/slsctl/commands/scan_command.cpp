@@ -14,9 +14,9 @@
 #include "core/dense/dense_map.hpp"
 #include "core/mesh/mesh_file.hpp"
 #include "core/mesh/mesh_grid.hpp"
-#include "daemon/rpc/message.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "picture/cloud/render_cloud.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

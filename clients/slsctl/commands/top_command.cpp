@@ -18,7 +18,7 @@
 #include "clients/slsctl/commands/client_commands.hpp"
 #include "clients/slsctl/report.hpp"
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

@@ -10,10 +10,10 @@
 #include <asio/post.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/rpc/message.hpp"
-#include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/reply.hpp"
 #include "daemon/server/service_state.hpp"
+#include "rpc/message.hpp"
+#include "rpc/param_reader.hpp"
 
 namespace slsd {
 

@@ -5,9 +5,9 @@
 #include <vector>
 
 #include "daemon/configuration/settings_over.hpp"
-#include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/methods/answer.hpp"
 #include "daemon/server/methods/methods.hpp"
+#include "rpc/param_reader.hpp"
 
 namespace slsd {
 namespace {

@@ -8,9 +8,9 @@
 #include <asio/post.hpp>
 
 #include "core/base64.hpp"
-#include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/methods/answer.hpp"
 #include "daemon/server/methods/methods_by_kind.hpp"
+#include "rpc/param_reader.hpp"
 
 namespace slsd {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "core/nearest_name.hpp"
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
 #include "daemon/scan/message_ids.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

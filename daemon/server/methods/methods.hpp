@@ -6,8 +6,8 @@
 #include <string_view>
 
 #include "daemon/configuration/access.hpp"
-#include "daemon/rpc/request.hpp"
 #include "daemon/server/methods/methods_by_kind.hpp"
+#include "rpc/request.hpp"
 
 namespace slsd {
 

@@ -4,9 +4,9 @@
 
 #include "core/utc_text.hpp"
 #include "daemon/configuration/presets.hpp"
-#include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/methods/answer.hpp"
 #include "daemon/server/methods/methods_by_kind.hpp"
+#include "rpc/param_reader.hpp"
 
 namespace slsd {
 namespace {

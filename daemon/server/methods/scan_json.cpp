@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/geometry/robot_pose.hpp"
-#include "daemon/rpc/message.hpp"
 #include "daemon/server/methods/counts_json.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

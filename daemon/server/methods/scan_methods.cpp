@@ -11,11 +11,11 @@
 
 #include "core/cloud/dense_file.hpp"
 #include "core/geometry/robot_pose.hpp"
-#include "daemon/rpc/message.hpp"
-#include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/methods/answer.hpp"
 #include "daemon/server/methods/methods_by_kind.hpp"
 #include "daemon/server/methods/scan_json.hpp"
+#include "rpc/message.hpp"
+#include "rpc/param_reader.hpp"
 
 namespace slsd {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 #include "daemon/configuration/settings_over.hpp"
-#include "daemon/rpc/param_reader.hpp"
 #include "daemon/server/methods/answer.hpp"
 #include "daemon/server/methods/methods_by_kind.hpp"
 #include "daemon/server/methods/metrics.hpp"
 #include "daemon/server/methods/scan_json.hpp"
 #include "daemon/server/methods/status_json.hpp"
+#include "rpc/param_reader.hpp"
 
 namespace slsd {
 namespace {

@@ -8,9 +8,9 @@
 #include <fstream>
 
 #include "core/printable.hpp"
-#include "daemon/rpc/message.hpp"
 #include "daemon/scan/scan_statistics.hpp"
 #include "daemon/server/methods/counts_json.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "core/base64.hpp"
-#include "daemon/rpc/request.hpp"
 #include "drivers/files/encode_png.hpp"
+#include "rpc/request.hpp"
 
 namespace slsd {
 namespace {

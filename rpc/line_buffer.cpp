@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/rpc/line_buffer.hpp"
+#include "rpc/line_buffer.hpp"
 
 namespace slsd {
 namespace {

@@ -11,7 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 

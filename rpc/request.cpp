@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/rpc/request.hpp"
+#include "rpc/request.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/rpc/param_reader.hpp"
+#include "rpc/param_reader.hpp"
 
 #include <optional>
 #include <string>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/rpc/request.hpp"
+#include "rpc/request.hpp"
 
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 namespace slsd {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/rpc/message.hpp"
+#include "rpc/message.hpp"
 
 #include "core/printable.hpp"
 
