@@ -17,9 +17,9 @@
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/message_ids.hpp"
-#include "daemon/service/logging.hpp"
 #include "daemon/service/notifier.hpp"
 #include "daemon/service/service.hpp"
+#include "drivers/log/logging.hpp"
 #include "drivers/system/own_program.hpp"
 #include "programs/command_line.hpp"
 #include "programs/start_calibrating.hpp"
@@ -75,7 +75,7 @@ int serve(const std::filesystem::path& configuration_file) {
   std::signal(SIGIO, SIG_IGN);   // for leases that watch lent memfds, if another process opens one
   std::signal(SIGHUP, SIG_IGN);  // a reload would read what is about to be read anyway
   spdlog::info("slsd {} starts with {}", SLSD_VERSION, configuration_file.string());
-  slsd::queue_log();
+  slsd::queue_log(slsd::MessageId::kLogDropped);
   auto configuration = slsd::load_configuration(configuration_file);
   if (!configuration) {
     // If the file exists, kNotFound means a user or a group, which another host may provide later.

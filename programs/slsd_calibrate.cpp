@@ -4,7 +4,7 @@
 
 #include <glog/logging.h>
 
-#include "daemon/service/logging.hpp"
+#include "drivers/log/logging.hpp"
 #include "programs/calibrate/calibrate_from_files.hpp"
 #include "programs/calibrate/measure_extrinsics.hpp"
 #include "programs/calibrate/session/session.hpp"

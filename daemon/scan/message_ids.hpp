@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "daemon/scan/log_field.hpp"
+#include "drivers/log/log_field.hpp"
 
 namespace slsd {
 

@@ -9,10 +9,10 @@
 #include <random>
 
 #include "daemon/configuration/settings_over.hpp"
-#include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/rig/devices.hpp"
 #include "drivers/files/encode_png.hpp"
+#include "drivers/log/log_field.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {

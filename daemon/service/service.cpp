@@ -21,8 +21,8 @@
 #include "daemon/server/methods/methods.hpp"
 #include "daemon/server/methods/metrics.hpp"
 #include "daemon/server/methods/status_json.hpp"
-#include "daemon/service/logging.hpp"
 #include "drivers/files/file.hpp"
+#include "drivers/log/logging.hpp"
 
 namespace slsd {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <algorithm>
 
-#include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
+#include "drivers/log/log_field.hpp"
 
 namespace slsd {
 namespace {

@@ -6,9 +6,9 @@
 
 #include <utility>
 
-#include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "drivers/camera/file_camera.hpp"
+#include "drivers/log/log_field.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {

@@ -8,9 +8,9 @@
 #include <condition_variable>
 #include <utility>
 
-#include "daemon/scan/log_field.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/rig/hardware.hpp"
+#include "drivers/log/log_field.hpp"
 
 namespace slsd {
 namespace {

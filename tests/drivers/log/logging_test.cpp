@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/service/logging.hpp"
+#include "drivers/log/logging.hpp"
 
 #include <condition_variable>
 #include <mutex>
@@ -10,7 +10,7 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/scan/log_field.hpp"
+#include "drivers/log/log_field.hpp"
 
 namespace slsd {
 namespace {
@@ -109,7 +109,7 @@ TEST(LogSink, TellsWhatTheThreadsLinesAreAbout) {
 TEST(LogSink, HoldsNobodyUpAndTellsOnceWhatWasDropped) {
   Reader reader;
   LogSink sink(reader.output());
-  sink.queue_lines();
+  sink.queue_lines("42");
   reader.set_reading(false);
   constexpr std::size_t kLogged = 5 * kLogLinesMax;
   for (std::size_t i = 0; i < kLogged; ++i) log_line(sink, std::to_string(i));
@@ -123,6 +123,7 @@ TEST(LogSink, HoldsNobodyUpAndTellsOnceWhatWasDropped) {
   ASSERT_THAT(lines, SizeIs(kLogged - dropped + 1));
   for (std::size_t i = 0; i + 1 < lines.size(); ++i) EXPECT_EQ(lines[i], "> " + std::to_string(i));
   EXPECT_THAT(lines.back(), HasSubstr(std::to_string(dropped) + " lines of the log were dropped here"));
+  EXPECT_THAT(reader.fields(), ElementsAre("MESSAGE_ID=42"));
   log_line(sink, "flows again");
   ASSERT_TRUE(sink.wait_written(kTimeout));
   EXPECT_EQ(reader.lines().back(), "> flows again");

@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <spdlog/common.h>
@@ -49,7 +50,8 @@ class LogSink final : public spdlog::sinks::sink {
   void set_formatter(std::unique_ptr<spdlog::formatter>) override {}
 
   /// Queues every line from now on.
-  void queue_lines();
+  /// @param id_of_dropped  MESSAGE_ID of the line that counts dropped lines
+  void queue_lines(std::string_view id_of_dropped);
   /// Waits until all earlier lines are written, at most this long. @return whether they are
   [[nodiscard]] bool wait_written(std::chrono::milliseconds timeout) const;
   [[nodiscard]] std::uint64_t dropped() const;
@@ -64,7 +66,8 @@ class LogSink final : public spdlog::sinks::sink {
 /// standard error, with time and level. Writes at once, so that a command's log and output keep their order.
 void start_logging(spdlog::level::level_enum level);
 /// Queues the log's lines from now on, so that no line delays any thread. For the service.
-void queue_log();
+/// @param id_of_dropped  as for LogSink::queue_lines()
+void queue_log(std::string_view id_of_dropped);
 /// Gives the log's reader this long to read the rest before the program ends.
 void flush_log(std::chrono::milliseconds timeout);
 /// Lines dropped since queue_log() because the reader was too slow.

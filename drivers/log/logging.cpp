@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/service/logging.hpp"
+#include "drivers/log/logging.hpp"
 
 #include <poll.h>
 #include <sys/stat.h>
@@ -22,8 +22,7 @@
 
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
-#include "daemon/scan/log_field.hpp"
-#include "daemon/scan/message_ids.hpp"
+#include "drivers/log/log_field.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
@@ -115,6 +114,7 @@ struct LogSink::Queue {
   bool ends = false;
   std::uint64_t dropped = 0;
   std::uint64_t told = 0;  // dropped lines reported so far
+  std::string id_of_dropped;
 
   // Writes one line for all dropped lines, at the place where they are missing.
   void take_up_again() {
@@ -122,7 +122,7 @@ struct LogSink::Queue {
     dropping = false;
     lines.push_back({spdlog::level::warn,
                      fmt::format("{} lines of the log were dropped here: nothing read them in time", dropped - missing),
-                     {fmt::format("MESSAGE_ID={}", MessageId::kLogDropped)}});
+                     {"MESSAGE_ID=" + id_of_dropped}});
   }
 
   void write_lines(const Output& output) {
@@ -165,10 +165,11 @@ void LogSink::log(const log_msg& message) {
   queue_->changed.notify_all();
 }
 
-void LogSink::queue_lines() {
+void LogSink::queue_lines(std::string_view id_of_dropped) {
   {
     const std::lock_guard lock(queue_->mutex);
     if (std::exchange(queue_->queued, true)) return;
+    queue_->id_of_dropped = id_of_dropped;
   }
   // Leaves the thread alone: a write to a stalled reader can neither be ended nor waited for.
   std::thread([queue = queue_, output = output_] {
@@ -199,8 +200,8 @@ void start_logging(level_enum level) {
   spdlog::set_default_logger(std::move(logger));
 }
 
-void queue_log() {
-  log_sink->queue_lines();
+void queue_log(std::string_view id_of_dropped) {
+  log_sink->queue_lines(id_of_dropped);
 }
 
 void flush_log(std::chrono::milliseconds timeout) {
