@@ -2,25 +2,13 @@
 // Copyright the slsd authors
 #include "daemon/server/lent_memory.hpp"
 
-#include <fcntl.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <string>
 #include <utility>
 
+#include "drivers/system/sealed_memory.hpp"
+
 namespace slsd {
-namespace {
-
-// The kernel grants a write lease only to the sole opener of a file, and a mapping counts as an opening. If it grants
-// no lease at all (an error other than EAGAIN), the memory is not watched.
-bool is_held_by_others(const FileDescriptor& kept) {
-  if (::fcntl(kept.number(), F_SETLEASE, F_WRLCK) != 0) return errno == EAGAIN;
-  ::fcntl(kept.number(), F_SETLEASE, F_UNLCK);
-  return false;
-}
-
-}  // namespace
 
 LentMemory::~LentMemory() {
   for (const Lent& lent : lent_) budget_.give_back(lent.bytes);

@@ -15,7 +15,7 @@
 #include "core/dense/cloud/dense_cloud.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/result.hpp"
-#include "daemon/scan/cloud/sealed_memory.hpp"
+#include "drivers/system/sealed_memory.hpp"
 
 namespace slsd {
 

@@ -9,7 +9,7 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/scan/cloud/sealed_memory.hpp"
+#include "drivers/system/sealed_memory.hpp"
 
 namespace slsd {
 namespace {

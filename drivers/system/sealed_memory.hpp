@@ -25,4 +25,9 @@ struct SealedMemory {
 [[nodiscard]] Result<SealedMemory> sealed_memory(const std::function<void(ByteSink&)>& write);
 [[nodiscard]] Result<SealedMemory> sealed_memory(std::string_view bytes);
 
+/// Tells whether anybody still has the memory open or mapped. False if the kernel grants no leases: then this memory
+/// cannot be watched.
+/// @param kept  of sealed_memory(), after `given` was sent or closed
+[[nodiscard]] bool is_held_by_others(const FileDescriptor& kept);
+
 }  // namespace slsd

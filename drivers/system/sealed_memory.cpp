@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/scan/cloud/sealed_memory.hpp"
+#include "drivers/system/sealed_memory.hpp"
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -61,6 +61,13 @@ Result<SealedMemory> sealed_memory(const std::function<void(ByteSink&)>& write) 
 
 Result<SealedMemory> sealed_memory(std::string_view bytes) {
   return sealed_memory([bytes](ByteSink& sink) { sink.take(bytes); });
+}
+
+// The kernel grants a write lease only to the sole opener of a file, and a mapping counts as an opening.
+bool is_held_by_others(const FileDescriptor& kept) {
+  if (::fcntl(kept.number(), F_SETLEASE, F_WRLCK) != 0) return errno == EAGAIN;
+  ::fcntl(kept.number(), F_SETLEASE, F_UNLCK);
+  return false;
 }
 
 }  // namespace slsd
