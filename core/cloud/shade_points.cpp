@@ -96,4 +96,14 @@ std::size_t shade_points(std::span<CloudPoint> points, const SceneLight& light) 
   return saturated;
 }
 
+std::optional<ColourGains> white_balance_of(std::span<const CloudPoint> points, const ColourGains& applied) {
+  ColourGains sums{};
+  for (const CloudPoint& point : points) {
+    if (std::ranges::max(point.colour) == 255) continue;
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += point.colour[i] / applied[i];
+  }
+  if (std::ranges::any_of(sums, [](double sum) { return sum <= 0; })) return std::nullopt;
+  return ColourGains{sums[1] / sums[0], 1, sums[1] / sums[2]};
+}
+
 }  // namespace slsd

@@ -51,4 +51,11 @@ struct ColourSample {
 /// @thread reentrant
 std::size_t shade_points(std::span<CloudPoint> points, const SceneLight& light);
 
+/// The factors that make the mean colour of these points grey. Empty: the mean lacks a colour. Saturated points are
+/// left out.
+/// @param applied  the factors in their colours
+/// @thread reentrant
+[[nodiscard]] std::optional<ColourGains> white_balance_of(std::span<const CloudPoint> points,
+                                                          const ColourGains& applied);
+
 }  // namespace slsd

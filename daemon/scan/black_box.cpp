@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "daemon/scan/cloud/frame_image.hpp"
+#include "drivers/camera/frame_image.hpp"
 
 namespace slsd {
 namespace {

@@ -4,9 +4,9 @@
 
 #include <utility>
 
-#include "daemon/scan/cloud/frame_image.hpp"
 #include "daemon/scan/cloud/merge_frames.hpp"
 #include "daemon/scan/cloud/reconstruct.hpp"
+#include "drivers/camera/frame_image.hpp"
 
 namespace slsd {
 namespace {

@@ -13,9 +13,11 @@
 #include "core/exposure/frame_noise.hpp"
 #include "core/geometry/robust.hpp"
 #include "core/utc_text.hpp"
-#include "daemon/scan/cloud/frame_image.hpp"
 #include "daemon/scan/cloud/seen_light.hpp"
 #include "daemon/scan/cloud/texture_cameras.hpp"
+#include "drivers/camera/frame_image.hpp"
+#include "drivers/files/encode_png.hpp"
+#include "picture/draw_decoding.hpp"
 
 namespace slsd {
 namespace {
@@ -205,7 +207,7 @@ Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_
     result.decode_time += steady_clock::now() - surfaces_begin;
     if (!request.picture || i != pictured) continue;
     const auto look = request.why ? DecodingLook::kReasons : DecodingLook::kSymbols;
-    auto picture = picture_of(set.frames[i].image(), **decoding, setup.pattern, look);
+    auto picture = encode_png(draw_decoding(set.frames[i].image(), **decoding, setup.pattern, look));
     if (!picture) return tl::unexpected(picture.error());
     result.picture_png = std::move(*picture);
   }

@@ -18,7 +18,7 @@ namespace slsd {
 /// Decodes the frames of one exposure into a cloud.
 /// @param set     one frame for each of the setup's decoders
 /// @param lane    selects the decoders; concurrent threads need different lanes
-/// @errors kNotFound: no calibration; kMismatch: a frame's size differs from the calibration's; of picture_of()
+/// @errors kNotFound: no calibration; kMismatch: a frame's size differs from the calibration's; of encode_png()
 /// @thread reentrant with different lanes
 [[nodiscard]] Result<ScanResult> reconstruct(const FrameSet& set, ScanSetup& setup, std::size_t lane,
                                              const ScanRequest& request, const std::string& scan_id);

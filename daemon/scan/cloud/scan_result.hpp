@@ -18,6 +18,7 @@
 #include "daemon/scan/cloud/cloud_files.hpp"
 #include "drivers/camera/camera.hpp"
 #include "drivers/camera/frame.hpp"
+#include "drivers/camera/frame_image.hpp"
 
 namespace slsd {
 
@@ -74,9 +75,6 @@ struct CameraWhiteBalance {
   ColourGains gains;  ///< factors that make the mean of the points grey; that of green is 1
 };
 
-/// The coding of the frames that are kept beside a cloud.
-enum class FrameCoding { kNone, kRaw, kPng };
-
 struct ScanRequest {
   MonotonicTime deadline;                   ///< end of the wait for devices and frames
   bool picture = false;                     ///< also draw the decoded symbols in the frame
@@ -100,19 +98,6 @@ struct FrameRequest {
   bool as_png = true;         ///< else raw, row by row
   bool as_shown = false;      ///< keep the projector's picture; else show the pattern
   std::stop_token gone = {};  ///< requested when nobody waits for the outcome any more
-};
-
-/// One camera's image as it arrived.
-struct FrameImage {
-  std::string bytes;  ///< a PNG, or pixels row by row, 16 bits little-endian
-  int width_px = 0;
-  int height_px = 0;
-  int bits = 8;
-  std::uint64_t sequence = 0;
-  std::string camera = {};  ///< the camera's name; the times are the Frame's
-  Picture light = Picture::kPattern;
-  MonotonicTime exposure_start = {};
-  MonotonicTime received = {};
 };
 
 /// The outcome of a scan.

@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #include "daemon/scan/cloud/seen_light.hpp"
 
-#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -49,16 +48,6 @@ Result<> read_light(const FrameSet& set, const ScanSetup& setup, std::size_t cam
   if (camera < set.dark.size()) seen.light.dark = set.dark[camera].image();
   seen.light.full = full_level_of(set, setup, camera);
   return coloured ? add_colours(set, setup, camera, seen) : Result<>();
-}
-
-std::optional<ColourGains> white_balance_of(std::span<const CloudPoint> points, const ColourGains& applied) {
-  ColourGains sums{};
-  for (const CloudPoint& point : points) {
-    if (std::ranges::max(point.colour) == 255) continue;
-    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += point.colour[i] / applied[i];
-  }
-  if (std::ranges::any_of(sums, [](double sum) { return sum <= 0; })) return std::nullopt;
-  return ColourGains{sums[1] / sums[0], 1, sums[1] / sums[2]};
 }
 
 }  // namespace slsd

@@ -3,8 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
-#include <span>
 
 #include "core/cloud/shade_points.hpp"
 #include "core/colour.hpp"
@@ -29,11 +27,5 @@ struct SeenLight {
 /// @errors of Frame::colours(); kMismatch: colours of another size than their frame
 [[nodiscard]] Result<> read_light(const FrameSet& set, const ScanSetup& setup, std::size_t camera, bool coloured,
                                   SeenLight& seen);
-
-/// The factors that make the mean colour of these points grey. Empty: the mean lacks a colour. Saturated points are
-/// left out.
-/// @param applied  the factors in their colours
-[[nodiscard]] std::optional<ColourGains> white_balance_of(std::span<const CloudPoint> points,
-                                                          const ColourGains& applied);
 
 }  // namespace slsd

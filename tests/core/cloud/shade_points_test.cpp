@@ -126,5 +126,23 @@ TEST(ShadePoints, StaysWithinTheFrame) {
   EXPECT_EQ(points[1].intensity, 75);
 }
 
+CloudPoint of_colour(const Rgb& colour) {
+  CloudPoint point;
+  point.colour = colour;
+  return point;
+}
+
+TEST(WhiteBalance, MakesTheMeanOfUnsaturatedPointsGrey) {
+  const std::vector<CloudPoint> points{of_colour({40, 100, 20}), of_colour({60, 100, 30}), of_colour({255, 1, 1})};
+  EXPECT_EQ(white_balance_of(points, {1, 1, 1}), (ColourGains{2, 1, 4}));
+  EXPECT_EQ(white_balance_of(points, {2, 1, 1}), (ColourGains{4, 1, 4})) << "the colours had this gain already";
+}
+
+TEST(WhiteBalance, IsUnknownIfTheMeanLacksAColour) {
+  EXPECT_FALSE(white_balance_of({}, {1, 1, 1}));
+  EXPECT_FALSE(white_balance_of(std::vector{of_colour({40, 100, 0})}, {1, 1, 1}));
+  EXPECT_FALSE(white_balance_of(std::vector{of_colour({255, 255, 255})}, {1, 1, 1}));
+}
+
 }  // namespace
 }  // namespace slsd

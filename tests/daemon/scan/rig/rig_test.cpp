@@ -6,8 +6,8 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/scan/cloud/frame_image.hpp"
 #include "daemon/scan/cloud/reconstruct.hpp"
+#include "drivers/camera/frame_image.hpp"
 #include "drivers/projector/headless_projector.hpp"
 #include "tests/daemon/scan/scripted_camera.hpp"
 #include "tests/simulator/simulator.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/scan/cloud/frame_image.hpp"
+#include "drivers/camera/frame_image.hpp"
 
 #include <cstring>
 #include <utility>
@@ -66,11 +66,6 @@ Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string 
   auto image = coding == FrameCoding::kPng ? png_of(frame) : raw_of(frame);
   if (image) image->camera = std::move(camera);
   return image;
-}
-
-Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern,
-                               DecodingLook look) {
-  return encode_png(draw_decoding(image, decoding, pattern, look));
 }
 
 }  // namespace slsd

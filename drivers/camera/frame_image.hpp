@@ -2,17 +2,31 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <cstdint>
 #include <string>
 
-#include "core/code/pattern.hpp"
-#include "core/decode/decoding.hpp"
 #include "core/image.hpp"
 #include "core/result.hpp"
-#include "daemon/scan/cloud/scan_result.hpp"
+#include "core/shown_picture.hpp"
 #include "drivers/camera/frame.hpp"
-#include "picture/draw_decoding.hpp"
 
 namespace slsd {
+
+/// The coding of frames that are kept.
+enum class FrameCoding { kNone, kRaw, kPng };
+
+/// One camera's image as it arrived.
+struct FrameImage {
+  std::string bytes;  ///< a PNG, or pixels row by row, 16 bits little-endian
+  int width_px = 0;
+  int height_px = 0;
+  int bits = 8;
+  std::uint64_t sequence = 0;
+  std::string camera = {};  ///< the camera's name; the times are the Frame's
+  Picture light = Picture::kPattern;
+  MonotonicTime exposure_start = {};
+  MonotonicTime received = {};
+};
 
 /// A frame as a PNG of the same bit depth. @errors of encode_png() @thread reentrant
 [[nodiscard]] Result<FrameImage> png_of(const Frame& frame);
@@ -26,9 +40,5 @@ void copy_raw(const Frame& frame, FrameImage& image);
 
 /// A frame in the coding for keeping. @param coding  not kNone @errors of encode_png() @thread reentrant
 [[nodiscard]] Result<FrameImage> image_of(const Frame& frame, FrameCoding coding, std::string camera);
-
-/// Draws the decoded symbols into the frame, as a PNG. @errors of encode_png() @thread reentrant
-[[nodiscard]] Result<std::string> picture_of(const GreyView& image, const Decoding& decoding, const Pattern& pattern,
-                                             DecodingLook look);
 
 }  // namespace slsd
