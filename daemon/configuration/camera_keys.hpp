@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/toml/table_reader.hpp"
 #include "daemon/configuration/camera_options.hpp"
-#include "daemon/configuration/table_reader.hpp"
 
 namespace slsd {
 

@@ -6,8 +6,8 @@
 #include <array>
 #include <utility>
 
+#include "core/toml/table_reader.hpp"
 #include "daemon/configuration/camera_keys.hpp"
-#include "daemon/configuration/table_reader.hpp"
 #include "drivers/files/file.hpp"
 
 namespace slsd {

@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "daemon/configuration/table_reader.hpp"
+#include "core/toml/table_reader.hpp"
 
 namespace slsd {
 namespace {

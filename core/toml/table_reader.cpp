@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "daemon/configuration/table_reader.hpp"
+#include "core/toml/table_reader.hpp"
 
 #include <algorithm>
 #include <cmath>

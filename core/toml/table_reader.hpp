@@ -27,7 +27,7 @@ class TableReader {
  public:
   /// @param table  null if the table is missing
   /// @param name   as a user writes it, "[pattern]"; empty for the file's top level
-  /// @param file   the configuration file; relative paths are relative to its folder
+  /// @param file   the file of the table; relative paths are relative to its folder
   TableReader(const toml::table* table, std::string name, std::filesystem::path file);
 
   [[nodiscard]] bool has(std::string_view key) const;
