@@ -131,11 +131,11 @@ void add_options(CLI::App& app, CommandLine& line) {
 
 /// --from, --board and --ruler belong to several commands.
 void check_commands(const CLI::App& app, const CommandLine& line) {
-  const bool looks = line.verify || line.request.correct;
-  if (looks && app.count("--ruler") > 0 && app.count("--board") == 0) {
+  const bool measures = line.verify || line.request.correct;
+  if (measures && app.count("--ruler") > 0 && app.count("--board") == 0) {
     throw CLI::RequiresError(line.verify ? "--ruler with --verify" : "--ruler with --correct", "--board");
   }
-  if (line.calibrate || looks) return;
+  if (line.calibrate || measures) return;
   const bool extrinsics = !line.extrinsics.file.empty();
   for (const char* option : {"--from", "--ruler"}) {
     if (app.count(option) > 0 && !(extrinsics && option == std::string_view("--ruler")))

@@ -25,7 +25,7 @@ struct HandEyeRequest {
   std::vector<double> pose;           ///< the robot's numbers: takes a picture with the service first; empty: none
   std::filesystem::path socket;       ///< the service's; with `pose` or `from_service`
   bool from_service = false;          ///< takes the calibration in force from the service, also without `pose`
-  bool looks = false;                 ///< with `json`: prints an object for each look first
+  bool looks = false;                 ///< with `json`: prints an object for each view first
   bool json = false;
 };
 

@@ -83,7 +83,7 @@ Result<Adjustment> solve(Observations& observations, PoseList& poses, const Eige
   return adjustment;
 }
 
-/// Moves the looks at the reference plane, which come last, out of the observations.
+/// Moves the views of the reference plane, which come last, out of the observations.
 std::vector<PoseObservation> set_planes_aside(Observations& observations) {
   const auto first = std::ranges::find(observations.poses, PoseSubject::kPlane, &PoseObservation::subject);
   std::vector<PoseObservation> planes(std::make_move_iterator(first),

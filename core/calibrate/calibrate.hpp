@@ -22,8 +22,8 @@ struct CalibrateOptions {
 /// cameras' rays to its pixels meet the board. Then one adjustment covers everything; distortion terms count only as
 /// far as the poses determine them. Contradicting poses and outlying points are left out and reported.
 ///
-/// Looks at a reference plane (Elahi et al. 2020) add a second step. The first step leaves them out. In the second
-/// step, the calibration so far measures each look, and everything is adjusted again with the looks among the poses.
+/// Views of a reference plane (Elahi et al. 2020) add a second step. The first step leaves them out. In the second
+/// step, the calibration so far measures each view, and everything is adjusted again with the views among the poses.
 /// @errors kImpossible: the observations do not determine the rig; the message says which poses to add
 /// @thread reentrant
 [[nodiscard]] Result<CalibrationOutcome> calibrate(Observations observations, const CalibrateOptions& options);

@@ -105,19 +105,19 @@ double log_prior_of(const PoseReading& reading, const HandEyeRecord& record) {
 
 /// Score of a session by its closed form: how far robot and board disagree in turn and place.
 double quick_score(const HandEyeSession& session) {
-  std::vector<const HandEyeLook*> looks;
-  for (const HandEyeLook& look : session.looks) looks.push_back(&look);
-  const HandEyePlaces places = first_places(session.mounted, looks);
+  std::vector<const HandEyeView*> views;
+  for (const HandEyeView& view : session.views) views.push_back(&view);
+  const HandEyePlaces places = first_places(session.mounted, views);
   double turns = 0, shifts = 0;
-  for (const HandEyeLook* look : looks) {
+  for (const HandEyeView* view : views) {
     const RigidTransform by_robot = places.mount_from_rig.inverse()
-                                        .after(mount_from_stand(session.mounted, look->base_from_flange))
+                                        .after(mount_from_stand(session.mounted, view->base_from_flange))
                                         .after(places.stand_from_board);
-    const RigidTransform& seen = look->board.rig_from_board;
+    const RigidTransform& seen = view->board.rig_from_board;
     turns += std::pow(Eigen::AngleAxisd(by_robot.rotation.transpose() * seen.rotation).angle(), 2);
-    shifts += (by_robot * look->board.middle_mm - seen * look->board.middle_mm).squaredNorm();
+    shifts += (by_robot * view->board.middle_mm - seen * view->board.middle_mm).squaredNorm();
   }
-  const auto count = static_cast<double>(looks.size());
+  const auto count = static_cast<double>(views.size());
   return -1.5 * count *
          (std::log(turns / count + kFewRad * kFewRad) + std::log(shifts / count + kFewPlaceMm * kFewPlaceMm));
 }
@@ -138,9 +138,9 @@ HandEyeModel without_lines(const PoseReading& reading) {
   return model;
 }
 
-/// The told order, or each pose one look earlier or later, or sorted by the turns.
+/// The told order, or each pose one view earlier or later, or sorted by the turns.
 std::vector<PoseReading> other_orders(const HandEyeRecord& record, const HandEyeSession& told) {
-  const std::size_t count = record.looks.size();
+  const std::size_t count = record.views.size();
   PoseReading later = as_told(record), earlier = later, sorted = later;
   for (std::size_t i = 0; i < count; ++i) {
     later.order.push_back(i > 0 ? i - 1 : PoseReading::kNoLine);
@@ -190,7 +190,7 @@ class Events {
   Events(const HandEyeRecord& record, Hypothesis plain) : record_(record), plain_(plain), best_(std::move(plain)) {}
 
   Hypothesis find() {
-    const std::size_t count = plain_.session.looks.size();
+    const std::size_t count = plain_.session.views.size();
     if (count > kPosesMin) {
       HandEyeModel late;
       late.late = true;
@@ -213,9 +213,9 @@ class Events {
     if (hypothesis.score > best_.score) best_ = std::move(hypothesis);
   }
 
-  // One after the other, the look whose absence helps most, while enough are left.
+  // One after the other, the view whose absence helps most, while enough are left.
   void leave_out() {
-    const std::size_t count = plain_.session.looks.size();
+    const std::size_t count = plain_.session.views.size();
     Hypothesis now = plain_;
     for (std::size_t out = 1; out <= count / 3 && count - out >= kPosesMin; ++out) {
       std::optional<Hypothesis> next;
@@ -238,7 +238,7 @@ class Events {
 
 HandEyeFinding move_finding(const Hypothesis& hypothesis, bool scanner) {
   const std::size_t first = scanner ? *hypothesis.model.scanner_moved : *hypothesis.model.board_moved;
-  const std::string& from = hypothesis.session.looks[first].name;
+  const std::string& from = hypothesis.session.views[first].name;
   const Move move = move_of(hypothesis.fit, scanner);
   const std::string size = fmt::format("{:.1f} mm and {:.2f}°", move.shift_mm.norm(), degrees(move.turn_rad.norm()));
   if (kind_of(move, rides(hypothesis.session.mounted, scanner)).tool) {
@@ -252,19 +252,19 @@ HandEyeFinding move_finding(const Hypothesis& hypothesis, bool scanner) {
 }
 
 void add_left_out(const HandEyeRecord& record, const Hypothesis& hypothesis, std::vector<HandEyeFinding>& findings) {
-  for (const std::size_t look : hypothesis.model.left_out) {
+  for (const std::size_t view : hypothesis.model.left_out) {
     if (!hypothesis.reading.order.empty()) return;  // they have no pose in this order
-    const auto same = [&](const RecordedLook& other) {
-      return other.name != record.looks[look].name && other.pose == record.looks[look].pose;
+    const auto same = [&](const RecordedView& other) {
+      return other.name != record.views[view].name && other.pose == record.views[view].pose;
     };
-    const auto twin = std::ranges::find_if(record.looks, same);
-    const std::string& name = record.looks[look].name;
-    if (twin != record.looks.end()) {
+    const auto twin = std::ranges::find_if(record.views, same);
+    const std::string& name = record.views[view].name;
+    if (twin != record.views.end()) {
       findings.push_back({Fault::kCopied, fmt::format("{} has a copy of the pose of {}, but another picture: leave it "
                                                       "out, or record its own pose",
                                                       name, twin->name)});
     } else {
-      const LookResidual& off = hypothesis.fit.residuals[look];
+      const ViewResidual& off = hypothesis.fit.residuals[view];
       findings.push_back(
           {Fault::kStray, fmt::format("{} contradicts the others, by {:.1f} mm and {:.2f}°: leave it out", name,
                                       off.shift_mm.norm(), degrees(off.turn_rad.norm()))});
@@ -300,7 +300,7 @@ void add_tool(const HandEyeRecord& record, const Hypothesis& hypothesis, std::ve
 /// Names the motion that a bad verdict lacks.
 void add_motion(const HandEyeResult& result, std::vector<HandEyeFinding>& findings) {
   if (grade(result.verdict) != HandEyeGrade::kBad) return;
-  const Eigen::Vector3d turns = turns_by_axis(result.session.looks).unaryExpr(&degrees);
+  const Eigen::Vector3d turns = turns_by_axis(result.session.views).unaryExpr(&degrees);
   const std::string error =
       result.verdict.error_mm < 1000 ? fmt::format("is uncertain by {:.1f} mm", result.verdict.error_mm) : "is unknown";
   const std::string place = fmt::format("a point at {:.0f} mm {}", result.verdict.distance_mm, error);
@@ -321,22 +321,22 @@ bool is_unrelated(const HandEyeFit& fit) {
 }
 
 bool turns_too_little(const HandEyeSession& session) {
-  const Eigen::Vector3d turns = turns_by_axis(session.looks).unaryExpr(&degrees);
+  const Eigen::Vector3d turns = turns_by_axis(session.views).unaryExpr(&degrees);
   return turns[1] < std::max(kTurnsMinDegrees, kOneAxisShare * turns[0]);
 }
 
 std::optional<HandEyeFinding> too_few(const HandEyeRecord& record) {
   std::set<std::vector<double>> poses;
-  for (const RecordedLook& look : record.looks) poses.insert(look.pose);
+  for (const RecordedView& view : record.views) poses.insert(view.pose);
   if (poses.size() >= kPosesMin) return std::nullopt;
-  if (record.looks.size() < kPosesMin) {
+  if (record.views.size() < kPosesMin) {
     return HandEyeFinding{
         Fault::kTooFewPoses,
         fmt::format("{} too few: at least 3 poses are needed, better 12",
-                    record.looks.size() == 1 ? "one pose is" : fmt::format("{} poses are", record.looks.size()))};
+                    record.views.size() == 1 ? "one pose is" : fmt::format("{} poses are", record.views.size()))};
   }
-  return HandEyeFinding{Fault::kCopied, fmt::format("{} looks have only {} different poses: the rest are copies",
-                                                    record.looks.size(), poses.size())};
+  return HandEyeFinding{Fault::kCopied, fmt::format("{} views have only {} different poses: the rest are copies",
+                                                    record.views.size(), poses.size())};
 }
 
 }  // namespace

@@ -40,15 +40,15 @@ RigidTransform mean_of(std::span<const RigidTransform> motions) {
   return {parts.matrixU() * signs * parts.matrixV().transpose(), places / static_cast<double>(motions.size())};
 }
 
-HandEyePlaces first_places(Mounted mounted, std::span<const HandEyeLook* const> looks) {
+HandEyePlaces first_places(Mounted mounted, std::span<const HandEyeView* const> views) {
   std::vector<RigidTransform> robot;
-  for (const HandEyeLook* look : looks) robot.push_back(mount_from_stand(mounted, look->base_from_flange));
+  for (const HandEyeView* view : views) robot.push_back(mount_from_stand(mounted, view->base_from_flange));
   Eigen::Matrix4d squares = Eigen::Matrix4d::Zero();
-  for (std::size_t i = 0; i < looks.size(); ++i) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       const Eigen::Quaterniond of_robot = positive(robot[i].rotation * robot[j].rotation.transpose());
       const Eigen::Quaterniond of_board =
-          positive(looks[i]->board.rig_from_board.rotation * looks[j]->board.rig_from_board.rotation.transpose());
+          positive(views[i]->board.rig_from_board.rotation * views[j]->board.rig_from_board.rotation.transpose());
       const Eigen::Matrix4d equation = left_minus_right(of_robot, of_board);
       squares += equation.transpose() * equation;
     }
@@ -59,12 +59,12 @@ HandEyePlaces first_places(Mounted mounted, std::span<const HandEyeLook* const> 
   HandEyePlaces places;
   places.mount_from_rig.rotation = turn.normalized().toRotationMatrix();
   // mount_from_rig * rig_from_board = mount_from_stand * stand_from_board, in the places
-  const auto rows = static_cast<Eigen::Index>(3 * looks.size());
+  const auto rows = static_cast<Eigen::Index>(3 * views.size());
   Eigen::MatrixXd equations(rows, 6);
   Eigen::VectorXd right(rows);
   std::vector<RigidTransform> boards;
-  for (std::size_t i = 0; i < looks.size(); ++i) {
-    const RigidTransform& seen = looks[i]->board.rig_from_board;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const RigidTransform& seen = views[i]->board.rig_from_board;
     const auto row = static_cast<Eigen::Index>(3 * i);
     equations.block<3, 3>(row, 0).setIdentity();
     equations.block<3, 3>(row, 3) = -robot[i].rotation;

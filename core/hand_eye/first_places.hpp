@@ -8,11 +8,11 @@
 
 namespace slsd {
 
-/// Places of scanner and board in closed form: the turn from quaternions of all pairs of looks (Chou and Kamel 1991),
-/// then both places by linear least squares. Directions that the looks do not determine get the shortest solution.
-/// @param looks  at least two
+/// Places of scanner and board in closed form: the turn from quaternions of all pairs of views (Chou and Kamel 1991),
+/// then both places by linear least squares. Directions that the views do not determine get the shortest solution.
+/// @param views  at least two
 /// @thread reentrant
-[[nodiscard]] HandEyePlaces first_places(Mounted mounted, std::span<const HandEyeLook* const> looks);
+[[nodiscard]] HandEyePlaces first_places(Mounted mounted, std::span<const HandEyeView* const> views);
 
 /// The mean of rigid motions that differ little.
 /// @param motions  at least one

@@ -92,22 +92,22 @@ struct State {
 class Adjustment {
  public:
   Adjustment(const HandEyeSession& session, const HandEyeModel& model) : session_(session), model_(model) {
-    for (std::size_t i = 0; i < session.looks.size(); ++i) {
+    for (std::size_t i = 0; i < session.views.size(); ++i) {
       if (std::ranges::find(model.left_out, i) == model.left_out.end()) counting_.push_back(i);
     }
     const auto take = [this](Eigen::Index size) {
       return std::exchange(at_.count, at_.count + static_cast<int>(size));
     };
-    const auto looks = static_cast<Eigen::Index>(session.looks.size());
+    const auto views = static_cast<Eigen::Index>(session.views.size());
     if (model.scanner_moved) at_.scanner_after = take(6), know_move();
     if (model.board_moved) at_.board_after = take(6), know_move();
     if (model.late)
-      at_.late = take(looks - 1), known_.insert(known_.end(), static_cast<std::size_t>(looks - 1), kLateness);
+      at_.late = take(views - 1), known_.insert(known_.end(), static_cast<std::size_t>(views - 1), kLateness);
     for (Eigen::Index i = 0; i < session.shared.sigma.size(); ++i) {
       if (session.shared.sigma[i] > 0) shared_.push_back(i), known_.push_back(session.shared.sigma[i]);
     }
     at_.shared = take(static_cast<Eigen::Index>(shared_.size()));
-    state_.late = Eigen::VectorXd::Zero(model.late ? looks - 1 : 0);
+    state_.late = Eigen::VectorXd::Zero(model.late ? views - 1 : 0);
     state_.shared = Eigen::VectorXd::Zero(session.shared.sigma.size());
     weights_.assign(counting_.size(), Matrix6d::Identity());
     begin();
@@ -124,7 +124,7 @@ class Adjustment {
     return result();
   }
 
-  // Residuals of the looks that count, then what is known beforehand; raw: in rad, mm and the unknowns' own units.
+  // Residuals of the views that count, then what is known beforehand; raw: in rad, mm and the unknowns' own units.
   template <class T>
   void residuals(const T* change, bool raw, T* out) const {
     const Motion<T> scanner = changed(state_.scanner, change), board = changed(state_.board, change + 6);
@@ -155,16 +155,16 @@ class Adjustment {
     }
     std::size_t row = 0;
     Motion<T> base_from_flange;
-    for (std::size_t i = 0; i < session_.looks.size(); ++i) {
-      const HandEyeLook& look = session_.looks[i];
+    for (std::size_t i = 0; i < session_.views.size(); ++i) {
+      const HandEyeView& view = session_.views[i];
       base_from_flange = i > 0 && model_.late
-                             ? carried_on(base_from_flange, look, late[static_cast<Eigen::Index>(i) - 1])
-                             : cast<T>(look.base_from_flange);
+                             ? carried_on(base_from_flange, view, late[static_cast<Eigen::Index>(i) - 1])
+                             : cast<T>(view.base_from_flange);
       if (row == counting_.size() || counting_[row] != i) continue;
       const bool scanner_is_after = model_.scanner_moved && i >= *model_.scanner_moved;
       const bool board_is_after = model_.board_moved && i >= *model_.board_moved;
       const Eigen::Matrix<T, 6, 1> residual =
-          residual_of(look, base_from_flange, scanner_is_after ? scanner_after : scanner,
+          residual_of(view, base_from_flange, scanner_is_after ? scanner_after : scanner,
                       board_is_after ? board_after : board, shared);
       Eigen::Map<Eigen::Matrix<T, 6, 1>> there(out + 6 * row);
       if (raw) {
@@ -182,20 +182,20 @@ class Adjustment {
  private:
   void know_move() { known_.insert(known_.end(), {kMovedRad, kMovedRad, kMovedRad, kMovedMm, kMovedMm, kMovedMm}); }
 
-  // The robot had a share of the way from the look before still to go when its pose was read.
+  // The robot had a share of the way from the view before still to go when its pose was read.
   template <class T>
-  static Motion<T> carried_on(const Motion<T>& before, const HandEyeLook& look, const T& late) {
-    const Motion<T> read = cast<T>(look.base_from_flange);
+  static Motion<T> carried_on(const Motion<T>& before, const HandEyeView& view, const T& late) {
+    const Motion<T> read = cast<T>(view.base_from_flange);
     const Vector3<T> way = vector_of(Matrix3<T>(read.turn * before.turn.transpose()));
     return {rotation_of(Vector3<T>(late * way)) * read.turn, read.place + late * (read.place - before.place)};
   }
 
   template <class T>
-  Eigen::Matrix<T, 6, 1> residual_of(const HandEyeLook& look, const Motion<T>& base_from_flange,
+  Eigen::Matrix<T, 6, 1> residual_of(const HandEyeView& view, const Motion<T>& base_from_flange,
                                      const Motion<T>& scanner, const Motion<T>& board,
                                      const Eigen::Matrix<T, Eigen::Dynamic, 1>& shared) const {
-    const RigidTransform& seen = look.board.rig_from_board;
-    const Vector3<T> middle = board.turn * look.board.middle_mm.cast<T>() + board.place;
+    const RigidTransform& seen = view.board.rig_from_board;
+    const Vector3<T> middle = board.turn * view.board.middle_mm.cast<T>() + board.place;
     Matrix3<T> turn;
     Vector3<T> in_mount;
     if (session_.mounted == Mounted::kArm) {
@@ -209,25 +209,25 @@ class Adjustment {
     residual.template head<3>() =
         vector_of(Matrix3<T>(scanner.turn.transpose() * turn * seen.rotation.transpose().cast<T>()));
     residual.template tail<3>() =
-        scanner.turn.transpose() * (in_mount - scanner.place) - (seen * look.board.middle_mm).cast<T>();
-    return residual - look.board.by_shared.cast<T>() * shared;
+        scanner.turn.transpose() * (in_mount - scanner.place) - (seen * view.board.middle_mm).cast<T>();
+    return residual - view.board.by_shared.cast<T>() * shared;
   }
 
   void begin() {
-    std::vector<const HandEyeLook*> before, after;
-    const std::size_t moved = model_.scanner_moved.value_or(model_.board_moved.value_or(session_.looks.size()));
-    for (const std::size_t i : counting_) (i < moved ? before : after).push_back(&session_.looks[i]);
+    std::vector<const HandEyeView*> before, after;
+    const std::size_t moved = model_.scanner_moved.value_or(model_.board_moved.value_or(session_.views.size()));
+    for (const std::size_t i : counting_) (i < moved ? before : after).push_back(&session_.views[i]);
     const bool begin_after = after.size() > before.size();
     const HandEyePlaces places = first_places(session_.mounted, begin_after ? after : before);
     state_.scanner = state_.scanner_after = places.mount_from_rig;
     state_.board = state_.board_after = places.stand_from_board;
-    const std::vector<const HandEyeLook*>& others = begin_after ? before : after;
+    const std::vector<const HandEyeView*>& others = begin_after ? before : after;
     if (others.empty()) return;
     std::vector<RigidTransform> scanners, boards;
-    for (const HandEyeLook* look : others) {
-      const RigidTransform robot = mount_from_stand(session_.mounted, look->base_from_flange);
-      scanners.push_back(robot.after(places.stand_from_board).after(look->board.rig_from_board.inverse()));
-      boards.push_back(robot.inverse().after(places.mount_from_rig).after(look->board.rig_from_board));
+    for (const HandEyeView* view : others) {
+      const RigidTransform robot = mount_from_stand(session_.mounted, view->base_from_flange);
+      scanners.push_back(robot.after(places.stand_from_board).after(view->board.rig_from_board.inverse()));
+      boards.push_back(robot.inverse().after(places.mount_from_rig).after(view->board.rig_from_board));
     }
     if (model_.scanner_moved) (begin_after ? state_.scanner : state_.scanner_after) = mean_of(scanners);
     if (model_.board_moved) (begin_after ? state_.board : state_.board_after) = mean_of(boards);
@@ -284,11 +284,11 @@ class Adjustment {
 
   // How a small turn of the robot's pose about the flange moves the board that the model predicts.
   [[nodiscard]] Eigen::Matrix<double, 6, 3> by_robot_turn(std::size_t index) const {
-    const HandEyeLook& look = session_.looks[index];
-    const RigidTransform& robot = look.base_from_flange;
+    const HandEyeView& view = session_.views[index];
+    const RigidTransform& robot = view.base_from_flange;
     const bool scanner_is_after = model_.scanner_moved && index >= *model_.scanner_moved;
     const bool board_is_after = model_.board_moved && index >= *model_.board_moved;
-    const Eigen::Vector3d middle = (board_is_after ? state_.board_after : state_.board) * look.board.middle_mm;
+    const Eigen::Vector3d middle = (board_is_after ? state_.board_after : state_.board) * view.board.middle_mm;
     const Eigen::Matrix3d rig_from_mount =
         (scanner_is_after ? state_.scanner_after : state_.scanner).rotation.transpose();
     const bool arm = session_.mounted == Mounted::kArm;
@@ -316,7 +316,7 @@ class Adjustment {
 
   [[nodiscard]] Level level_at(const RobotNoise& noise) const {
     const int count = at_.count, known = static_cast<int>(known_.size());
-    const auto looks = static_cast<int>(counting_.size());
+    const auto views = static_cast<int>(counting_.size());
     const double corner = session_.corner_px * session_.corner_px;
     Level level;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(count, count);
@@ -324,12 +324,12 @@ class Adjustment {
     for (int i = 0; i < 12; ++i) normal(i, i) = std::pow(i % 6 < 3 ? kAnywhereRad : kAnywhereMm, -2);
     std::vector<Matrix6d> inverse;
     std::vector<std::array<Matrix6d, 2>> parts;
-    double twice = (6 * looks + known - count) * std::log(2 * std::numbers::pi);
-    for (int i = 0; i < looks; ++i) {
+    double twice = (6 * views + known - count) * std::log(2 * std::numbers::pi);
+    for (int i = 0; i < views; ++i) {
       Matrix6d place = Matrix6d::Zero();
       place.bottomRightCorner<3, 3>().diagonal().setConstant(noise.place_mm * noise.place_mm);
       const Matrix6d turn = noise.turn_rad * noise.turn_rad * by_turn_[i] * by_turn_[i].transpose();
-      const Matrix6d seen = corner * session_.looks[counting_[i]].board.normal.inverse();
+      const Matrix6d seen = corner * session_.views[counting_[i]].board.normal.inverse();
       const Eigen::LLT<Matrix6d> whole(seen + place + turn);
       const Matrix6d lower = whole.matrixL();
       level.weights.push_back(lower.inverse());
@@ -341,10 +341,10 @@ class Adjustment {
       right -= slopes.transpose() * inverse[i] * off_.segment<6>(6 * i);
     }
     for (int i = 0; i < known; ++i) {
-      const auto slopes = slopes_.row(6 * looks + i);
+      const auto slopes = slopes_.row(6 * views + i);
       const double weight = std::pow(known_[i], -2);
       normal += weight * slopes.transpose() * slopes;
-      right -= weight * off_[6 * looks + i] * slopes.transpose();
+      right -= weight * off_[6 * views + i] * slopes.transpose();
       twice += 2 * std::log(known_[i]);
     }
     const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
@@ -352,7 +352,7 @@ class Adjustment {
     level.covariance = solver.solve(Eigen::MatrixXd::Identity(count, count));
     twice += solver.vectorD().array().max(1e-300).log().sum();
     Eigen::MatrixXd spread[2] = {Eigen::MatrixXd::Zero(count, count), Eigen::MatrixXd::Zero(count, count)};
-    for (int i = 0; i < looks; ++i) {
+    for (int i = 0; i < views; ++i) {
       const auto slopes = slopes_.middleRows(6 * i, 6);
       const Eigen::MatrixXd weighted = inverse[i] * slopes;
       const Vector6d force = inverse[i] * left.segment<6>(6 * i);
@@ -367,7 +367,7 @@ class Adjustment {
         }
       }
     }
-    for (int i = 0; i < known; ++i) twice += std::pow(left[6 * looks + i] / known_[i], 2);
+    for (int i = 0; i < known; ++i) twice += std::pow(left[6 * views + i] / known_[i], 2);
     for (int k = 0; k < 2; ++k) {
       level.slope[k] += 0.5 * (level.covariance * spread[k]).trace();
       level.widening[k] = level.covariance * spread[k] * level.covariance;
@@ -429,11 +429,11 @@ class Adjustment {
       fit.evidence += log_normal(state_.scanner.translation[i], arm ? kHeldMm : kStandingMm);
       fit.evidence += log_normal(state_.board.translation[i], arm ? kStandingMm : kHeldMm);
     }
-    for (std::size_t i = 0; i < session_.looks.size(); ++i) {
+    for (std::size_t i = 0; i < session_.views.size(); ++i) {
       const bool scanner_is_after = model_.scanner_moved && i >= *model_.scanner_moved;
       const bool board_is_after = model_.board_moved && i >= *model_.board_moved;
       const Vector6d residual =
-          residual_of(session_.looks[i], cast<double>(session_.looks[i].base_from_flange),
+          residual_of(session_.views[i], cast<double>(session_.views[i].base_from_flange),
                       cast<double>(scanner_is_after ? state_.scanner_after : state_.scanner),
                       cast<double>(board_is_after ? state_.board_after : state_.board), state_.shared);
       fit.residuals.push_back({residual.head<3>(), residual.tail<3>()});

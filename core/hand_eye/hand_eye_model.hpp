@@ -11,27 +11,27 @@
 
 namespace slsd {
 
-/// One look of a session.
-struct HandEyeLook {
+/// One view of a session.
+struct HandEyeView {
   std::string name;
   LocatedBoard board;
   RigidTransform base_from_flange;
 };
 
-/// A session of looks, in the order in which they were taken.
+/// A session of views, in the order in which they were taken.
 struct HandEyeSession {
   Mounted mounted = Mounted::kArm;
-  std::vector<HandEyeLook> looks;
+  std::vector<HandEyeView> views;
   SharedErrors shared;
   double corner_px = 0.05;  ///< one standard deviation of a corner's coordinate
 };
 
 /// Events of a session that can be fitted. By default there are none.
 struct HandEyeModel {
-  std::vector<std::size_t> left_out;         ///< looks that are unrelated to the others
-  std::optional<std::size_t> scanner_moved;  ///< the first look after the scanner moved on what carries it
+  std::vector<std::size_t> left_out;         ///< views that are unrelated to the others
+  std::optional<std::size_t> scanner_moved;  ///< the first view after the scanner moved on what carries it
   std::optional<std::size_t> board_moved;    ///< the same for the board
-  bool late = false;                         ///< the robot's poses were read somewhere on the way from look to look
+  bool late = false;                         ///< the robot's poses were read somewhere on the way from view to view
 };
 
 /// The mounting of scanner and board. `mount` carries the scanner: the flange (kArm) or the base (kCell); `stand`

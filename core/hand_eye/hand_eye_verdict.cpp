@@ -56,12 +56,12 @@ std::string_view to_string(HandEyeGrade grade) {
   return "bad";
 }
 
-Eigen::Vector3d turns_by_axis(std::span<const HandEyeLook> looks) {
+Eigen::Vector3d turns_by_axis(std::span<const HandEyeView> views) {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   double pairs = 0;
-  for (std::size_t i = 0; i < looks.size(); ++i) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      const Eigen::AngleAxisd turn(looks[i].base_from_flange.rotation.transpose() * looks[j].base_from_flange.rotation);
+      const Eigen::AngleAxisd turn(views[i].base_from_flange.rotation.transpose() * views[j].base_from_flange.rotation);
       squares += turn.angle() * turn.angle() * turn.axis() * turn.axis().transpose();
       ++pairs;
     }

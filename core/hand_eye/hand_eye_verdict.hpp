@@ -31,6 +31,6 @@ inline constexpr double kGoodHandEyeMm = 1, kUsableHandEyeMm = 3;
 
 /// Turns of a session's poses about each axis: root mean squares (rad) of the turns between all pairs of poses,
 /// along the three principal axes, largest first.
-[[nodiscard]] Eigen::Vector3d turns_by_axis(std::span<const HandEyeLook> looks);
+[[nodiscard]] Eigen::Vector3d turns_by_axis(std::span<const HandEyeView> views);
 
 }  // namespace slsd

@@ -23,7 +23,7 @@ struct CameraSighting {
   BoardSighting sighting;
 };
 
-/// Errors that all looks of a session share, each with a deviation: the scale of the print, then fx fy cx cy (px) of
+/// Errors that all views of a session share, each with a deviation: the scale of the print, then fx fy cx cy (px) of
 /// each camera of the calibration.
 struct SharedErrors {
   Eigen::VectorXd sigma;
@@ -53,7 +53,7 @@ struct LocatedBoard {
 [[nodiscard]] Result<LocatedBoard> locate_board(std::span<const CameraSighting> sightings, const Board& board,
                                                 const Calibration& calibration);
 
-/// One standard deviation of a corner's coordinate, px, from the residuals of all looks; at least what find_board()
+/// One standard deviation of a corner's coordinate, px, from the residuals of all views; at least what find_board()
 /// promises.
 [[nodiscard]] double corner_noise_px(std::span<const LocatedBoard> boards);
 

@@ -49,8 +49,8 @@ std::optional<LocatedBoard> as_if_seen(const Calibration& calibration, const Boa
 
 void begin_from_nearest(const HandEyeSession& session, NextPose& next) {
   next.turn_rad = 2 * std::numbers::pi;
-  for (std::size_t i = 0; i < session.looks.size(); ++i) {
-    const RigidTransform& other = session.looks[i].base_from_flange;
+  for (std::size_t i = 0; i < session.views.size(); ++i) {
+    const RigidTransform& other = session.views[i].base_from_flange;
     const Eigen::AngleAxisd turn(other.rotation.transpose() * next.base_from_flange.rotation);
     if (turn.angle() >= next.turn_rad) continue;
     next.from = i, next.turn_rad = turn.angle(), next.axis = turn.axis();
@@ -64,7 +64,7 @@ std::optional<NextPose> propose_pose(const HandEyeSession& session, const HandEy
                                      const Calibration& calibration, const Board& board, double working_distance_mm) {
   std::optional<NextPose> best;
   HandEyeSession with = session;
-  with.looks.emplace_back();
+  with.views.emplace_back();
   for (const double share : kDistances) {
     for (int side = 0; side < kTiltSides; ++side) {
       for (const double roll : kRollsRad) {
@@ -73,7 +73,7 @@ std::optional<NextPose> propose_pose(const HandEyeSession& session, const HandEy
         if (!seen) continue;
         const RigidTransform robot = fit.places.mount_from_rig.after(view).after(fit.places.stand_from_board.inverse());
         const RigidTransform pose = session.mounted == Mounted::kArm ? robot.inverse() : robot;
-        with.looks.back() = {"next", *seen, pose};
+        with.views.back() = {"next", *seen, pose};
         const double error_mm = judge_hand_eye(fit_hand_eye(with), working_distance_mm).error_mm;
         if (!best || error_mm < best->error_mm) best = NextPose{pose, error_mm, 0, Eigen::Vector3d::UnitZ(), 0, 0};
       }
@@ -85,7 +85,7 @@ std::optional<NextPose> propose_pose(const HandEyeSession& session, const HandEy
 
 std::string describe(const NextPose& next, const HandEyeSession& session) {
   return fmt::format("from {}, turn the flange by {:.0f}° about ({:.2f}, {:.2f}, {:.2f}) and move it by {:.0f} mm",
-                     session.looks[next.from].name, next.turn_rad * 180 / std::numbers::pi, next.axis.x(),
+                     session.views[next.from].name, next.turn_rad * 180 / std::numbers::pi, next.axis.x(),
                      next.axis.y(), next.axis.z(), next.move_mm);
 }
 

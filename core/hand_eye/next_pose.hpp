@@ -13,14 +13,14 @@ namespace slsd {
 struct NextPose {
   RigidTransform base_from_flange;
   double error_mm = 0;   ///< HandEyeVerdict::error_mm that is expected with it
-  std::size_t from = 0;  ///< the look whose pose turns least into it
+  std::size_t from = 0;  ///< the view whose pose turns least into it
   Eigen::Vector3d axis;  ///< of the turn from that pose, in the flange
   double turn_rad = 0;   ///< of that turn, at least 0
   double move_mm = 0;    ///< of the flange from that pose
 };
 
 /// Proposes the pose that shrinks the error at the working distance most: the board in the middle of the picture, at
-/// one of a few distances, tilts and rolls. Each candidate is adjusted with the looks so far, as if it were taken.
+/// one of a few distances, tilts and rolls. Each candidate is adjusted with the views so far, as if it were taken.
 /// Tells nothing of what the arm can reach.
 /// @param fit  of this session, with what its model leaves out
 /// @return     nothing if no candidate shows most of the board

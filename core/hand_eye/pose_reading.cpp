@@ -108,18 +108,18 @@ std::vector<PoseReading> other_readings(const HandEyeRecord& record) {
 }
 
 std::vector<std::size_t> order_by_turns(const HandEyeSession& session) {
-  const std::size_t count = session.looks.size();
+  const std::size_t count = session.views.size();
   const Eigen::MatrixXd robot =
-      turns_between(count, [&](std::size_t i) { return session.looks[i].base_from_flange.rotation; });
+      turns_between(count, [&](std::size_t i) { return session.views[i].base_from_flange.rotation; });
   const Eigen::MatrixXd board =
-      turns_between(count, [&](std::size_t i) { return session.looks[i].board.rig_from_board.rotation; });
+      turns_between(count, [&](std::size_t i) { return session.views[i].board.rig_from_board.rotation; });
   std::vector<std::size_t> order(count), left(count);
   std::iota(left.begin(), left.end(), 0);
-  for (std::size_t look = 0; look < count; ++look) {
+  for (std::size_t view = 0; view < count; ++view) {
     const auto nearest = std::ranges::min_element(left, {}, [&](std::size_t line) {
-      return row_distance(board, static_cast<Eigen::Index>(look), robot, static_cast<Eigen::Index>(line));
+      return row_distance(board, static_cast<Eigen::Index>(view), robot, static_cast<Eigen::Index>(line));
     });
-    order[look] = *nearest;
+    order[view] = *nearest;
     left.erase(nearest);
   }
   double squares = 0;
@@ -139,15 +139,15 @@ Result<HandEyeSession> read_session(const HandEyeRecord& record, const PoseReadi
   session.mounted = reading.mounted;
   session.shared = record.shared;
   session.corner_px = record.corner_px;
-  for (std::size_t i = 0; i < record.looks.size(); ++i) {
+  for (std::size_t i = 0; i < record.views.size(); ++i) {
     const std::size_t line = reading.order.empty() ? i : reading.order[i];
-    HandEyeLook look{record.looks[i].name, record.looks[i].board, {}};
+    HandEyeView view{record.views[i].name, record.views[i].board, {}};
     if (line != PoseReading::kNoLine) {
-      const auto pose = read_robot_pose(record.looks[line].pose, reading.notation);
-      if (!pose) return fail(pose.error().code, pose.error().message, record.looks[line].name);
-      look.base_from_flange = mirrored(reading.inverted ? pose->inverse() : *pose, reading.mirror);
+      const auto pose = read_robot_pose(record.views[line].pose, reading.notation);
+      if (!pose) return fail(pose.error().code, pose.error().message, record.views[line].name);
+      view.base_from_flange = mirrored(reading.inverted ? pose->inverse() : *pose, reading.mirror);
     }
-    session.looks.push_back(std::move(look));
+    session.views.push_back(std::move(view));
   }
   return session;
 }
@@ -181,8 +181,8 @@ std::vector<HandEyeFinding> differences(const HandEyeRecord& record, const PoseR
     std::string pairs;
     for (std::size_t i = 0; i < reading.order.size() && pairs.size() < 80; ++i) {
       if (reading.order[i] == i || reading.order[i] == PoseReading::kNoLine) continue;
-      pairs += fmt::format("{}{} belongs to the pose of {}", pairs.empty() ? "" : ", ", record.looks[i].name,
-                           record.looks[reading.order[i]].name);
+      pairs += fmt::format("{}{} belongs to the pose of {}", pairs.empty() ? "" : ", ", record.views[i].name,
+                           record.views[reading.order[i]].name);
     }
     add(Fault::kPoseOrder, "the poses are in another order than the pictures: " + pairs);
   }

@@ -10,8 +10,8 @@
 
 namespace slsd {
 
-/// One look as it was recorded.
-struct RecordedLook {
+/// One view as it was recorded.
+struct RecordedView {
   std::string name;
   std::vector<double> pose;  ///< the robot's numbers
   LocatedBoard board;
@@ -21,7 +21,7 @@ struct RecordedLook {
 struct HandEyeRecord {
   Mounted mounted = Mounted::kArm;
   PoseNotation notation;
-  std::vector<RecordedLook> looks;  ///< in the order in which they were taken
+  std::vector<RecordedView> views;  ///< in the order in which they were taken
   SharedErrors shared;
   double corner_px = 0.05;                     ///< one standard deviation of a corner's coordinate
   std::optional<Eigen::Vector3d> measured_mm;  ///< place of the scanner on the arm by a ruler
@@ -38,7 +38,7 @@ struct PoseReading {
   PoseNotation notation;
   bool inverted = false;  ///< the poses are flange_from_base
   Mirror mirror = Mirror::kNone;
-  std::vector<std::size_t> order;  ///< line of each look; a look with kNoLine has none; empty: its own line
+  std::vector<std::size_t> order;  ///< line of each view; a view with kNoLine has none; empty: its own line
   static constexpr std::size_t kNoLine = static_cast<std::size_t>(-1);
 };
 
@@ -48,12 +48,12 @@ struct PoseReading {
 /// handedness or mounting.
 [[nodiscard]] std::vector<PoseReading> other_readings(const HandEyeRecord& record);
 
-/// Lines of the looks by the turns between them, which are the same for robot and board whatever else is wrong. Empty
+/// Lines of the views by the turns between them, which are the same for robot and board whatever else is wrong. Empty
 /// if no order fits, or if the order is the record's own.
 [[nodiscard]] std::vector<std::size_t> order_by_turns(const HandEyeSession& session);
 
 /// The session in one reading.
-/// @errors those of read_robot_pose(), with the look's name
+/// @errors those of read_robot_pose(), with the view's name
 /// @thread reentrant
 [[nodiscard]] Result<HandEyeSession> read_session(const HandEyeRecord& record, const PoseReading& reading);
 

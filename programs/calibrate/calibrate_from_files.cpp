@@ -65,7 +65,7 @@ std::string refusals(const std::vector<PoseReport>& refused) {
   return text;
 }
 
-/// Keeps the poses from one name to another, and all looks at the reference plane.
+/// Keeps the poses from one name to another, and all views of the reference plane.
 Result<> keep_part(const std::string& use, std::vector<CapturedPose>& poses) {
   const std::size_t colon = use.find(':');
   const std::string first = use.substr(0, colon), last = colon == use.npos ? first : use.substr(colon + 1);

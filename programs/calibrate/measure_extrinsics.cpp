@@ -87,7 +87,7 @@ GreyView view_of(const client::Frame& frame) {
 }
 
 // Takes one scan with its white frame: the board in the frame, and its cloud.
-Result<CloudLook> look(Scanner& scanner, const Board& board) {
+Result<CloudView> take_view(Scanner& scanner, const Board& board) {
   client::Cloud cloud;
   json told;
   const client::Frame* white = nullptr;
@@ -118,7 +118,7 @@ Result<CloudLook> look(Scanner& scanner, const Board& board) {
   for (const client::Point point : cloud) {
     if (point.camera == 0) points.emplace_back(point.x, point.y, point.z);
   }
-  return look_in_cloud(points, *sighting, board, scanner.calibrated.lens);
+  return view_in_cloud(points, *sighting, board, scanner.calibrated.lens);
 }
 
 std::string quoted(const std::string& text) {
@@ -152,10 +152,10 @@ std::string file_text(const ExtrinsicsRequest& request, const std::vector<Scanne
 }
 
 // Scans with each scanner. Reports those that see the board, and those that do not.
-Result<std::vector<CloudLook>> look_at_place(std::vector<Scanner>& scanners, const Board& board) {
-  std::vector<CloudLook> looks;
+Result<std::vector<CloudView>> look_at_place(std::vector<Scanner>& scanners, const Board& board) {
+  std::vector<CloudView> views;
   for (std::size_t i = 0; i < scanners.size(); ++i) {
-    auto seen = look(scanners[i], board);
+    auto seen = take_view(scanners[i], board);
     if (!seen && seen.error().code != ErrorCode::kNotFound && seen.error().code != ErrorCode::kMismatch)
       return tl::unexpected(seen.error());
     if (!seen) {
@@ -166,16 +166,16 @@ Result<std::vector<CloudLook>> look_at_place(std::vector<Scanner>& scanners, con
     std::cout << fmt::format(
         "  {}: {} corners at {:.0f} mm; the board is flat to {:.3f} mm, and {:+.2f} % of its size\n", scanners[i].name,
         seen->corners.size(), seen->middle_mm.norm(), seen->bend_mm, seen->scale_percent);
-    looks.push_back(std::move(*seen));
+    views.push_back(std::move(*seen));
   }
-  return looks;
+  return views;
 }
 
 // Scanners of different scales agree at the board and differ beside it.
-Result<> check_scales(const std::vector<std::vector<CloudLook>>& places, const std::vector<Scanner>& scanners) {
-  for (const auto& looks : places) {
-    const auto [least, most] = std::ranges::minmax_element(looks, {}, &CloudLook::scale_percent);
-    if (looks.size() < 2 || most->scale_percent - least->scale_percent < kScalesDifferMax) continue;
+Result<> check_scales(const std::vector<std::vector<CloudView>>& places, const std::vector<Scanner>& scanners) {
+  for (const auto& views : places) {
+    const auto [least, most] = std::ranges::minmax_element(views, {}, &CloudView::scale_percent);
+    if (views.size() < 2 || most->scale_percent - least->scale_percent < kScalesDifferMax) continue;
     return fail(ErrorCode::kMismatch,
                 fmt::format("{} measures the board {:.2f} % larger than {} does: calibrate both again, with one board",
                             scanners[most->scanner].name, most->scale_percent - least->scale_percent,
@@ -203,7 +203,7 @@ Result<> measure_extrinsics(const ExtrinsicsRequest& request, const CalibrateReq
   }
   if (scanners.size() < 2) return fail(ErrorCode::kInvalidArgument, "needs two scanners or more", "--scanner");
   if (request.parent.empty()) return fail(ErrorCode::kInvalidArgument, "is empty", "--parent");
-  std::vector<std::vector<CloudLook>> places;
+  std::vector<std::vector<CloudView>> places;
   const auto wanted = static_cast<std::size_t>(request.places);
   std::string line;
   while (places.size() < wanted) {
@@ -211,10 +211,10 @@ Result<> measure_extrinsics(const ExtrinsicsRequest& request, const CalibrateReq
                              places.size() + 1, wanted, describe(*board))
               << std::endl;
     if (!std::getline(std::cin, line)) break;
-    auto looks = look_at_place(scanners, *board);
-    if (!looks) return tl::unexpected(looks.error());
-    if (looks->size() > 1) {
-      places.push_back(std::move(*looks));
+    auto views = look_at_place(scanners, *board);
+    if (!views) return tl::unexpected(views.error());
+    if (views->size() > 1) {
+      places.push_back(std::move(*views));
     } else {
       std::cout << "  this place does not count: fewer than two scanners see the board\n";
     }

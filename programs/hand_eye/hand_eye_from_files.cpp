@@ -28,7 +28,7 @@
 #include "programs/calibrate/captures/captured_pictures.hpp"
 #include "programs/calibrate/session/socket_source.hpp"
 #include "programs/hand_eye/poses_file.hpp"
-#include "programs/hand_eye/take_look.hpp"
+#include "programs/hand_eye/take_view.hpp"
 
 namespace slsd {
 namespace {
@@ -68,10 +68,10 @@ Result<Board> board_of(const HandEyeRequest& request, const Calibration& calibra
   return requested_board(as_for_calibrating);
 }
 
-/// Reads the looks of a folder.
-class LookReader {
+/// Reads the views of a folder.
+class ViewReader {
  public:
-  LookReader(const Calibration& calibration, const Board& board, std::string first_camera,
+  ViewReader(const Calibration& calibration, const Board& board, std::string first_camera,
              const HandEyeRequest& request)
       : calibration_(calibration), board_(board), first_camera_(std::move(first_camera)), request_(request) {}
 
@@ -181,7 +181,7 @@ struct Scanner {
   std::string first_camera;
 };
 
-/// @param added  the look that must show the board; empty: none
+/// @param added  the view that must show the board; empty: none
 Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Scanner& scanner, const std::string& added) {
   HandEyeRecord record;
   record.mounted = request.mounted == "arm" ? Mounted::kArm : Mounted::kCell;
@@ -197,7 +197,7 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Scanner& 
     return fail(ErrorCode::kNotFound, "poses.csv names it, but there is no such folder",
                 (request.from / line.name).string());
   }
-  LookReader reader(scanner.calibration, scanner.board, scanner.first_camera, request);
+  ViewReader reader(scanner.calibration, scanner.board, scanner.first_camera, request);
   std::vector<LocatedBoard> boards;
   for (const CapturedPose& capture : *captures) {
     const auto line = std::ranges::find(*lines, capture.name, &PoseLine::name);
@@ -209,7 +209,7 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Scanner& 
     auto seen = reader.read(capture, capture.name == added);
     if (!seen) return tl::unexpected(seen.error());
     if (!*seen) continue;
-    record.looks.push_back({capture.name, line->numbers, **seen});
+    record.views.push_back({capture.name, line->numbers, **seen});
     boards.push_back(**seen);
   }
   record.shared = SharedErrors::of(scanner.calibration, request.ruler.empty() ? kPrintUnmeasured : kPrintMeasured);
@@ -220,11 +220,11 @@ Result<HandEyeRecord> read_record(const HandEyeRequest& request, const Scanner& 
 }
 
 double usual_distance_mm(const HandEyeRecord& record) {
-  constexpr double kWithoutLooks = 1000;
+  constexpr double kWithoutViews = 1000;
   std::vector<double> distances;
-  for (const RecordedLook& look : record.looks)
-    distances.push_back((look.board.rig_from_board * look.board.middle_mm).norm());
-  return distances.empty() ? kWithoutLooks : median_in_place(distances);
+  for (const RecordedView& view : record.views)
+    distances.push_back((view.board.rig_from_board * view.board.middle_mm).norm());
+  return distances.empty() ? kWithoutViews : median_in_place(distances);
 }
 
 std::string result_text(const HandEyeResult& result) {
@@ -250,7 +250,7 @@ HandEyeCalibration to_keep(const HandEyeResult& result, const Board& board, cons
   kept.distance_mm = result.verdict.distance_mm, kept.error_mm = result.verdict.error_mm;
   kept.verdict = to_string(grade(result.verdict));
   kept.robot_place_mm = fit.noise.place_mm, kept.robot_turn_rad = fit.noise.turn_rad;
-  kept.poses = static_cast<int>(result.session.looks.size());
+  kept.poses = static_cast<int>(result.session.views.size());
   kept.board = to_string(board), kept.date = utc_text(std::chrono::system_clock::now());
   kept.calibration_date = calibration.report.date.value_or("");
   return kept;
@@ -266,7 +266,7 @@ bool lacks_poses(const HandEyeFinding& finding) {
 /// A proposal of the next pose.
 struct Proposal {
   std::string text;
-  std::vector<double> numbers;  ///< as the robot writes them; empty: too few looks to place the scanner
+  std::vector<double> numbers;  ///< as the robot writes them; empty: too few views to place the scanner
 };
 
 constexpr double kNumbersPerUnit = 1e4;  // so that neither mm nor m loses what a robot can do
@@ -315,12 +315,12 @@ void tell(const HandEyeRequest& request, const HandEyeResult& result, std::size_
   print_line(told);
 }
 
-/// Tells whether more looks may follow: then too few poses or too little motion are no faults.
+/// Tells whether more views may follow: then too few poses or too little motion are no faults.
 bool may_go_on(const HandEyeRequest& request) {
   return request.from_service || !request.pose.empty();
 }
 
-/// @param added  the look that was just taken; empty: none
+/// @param added  the view that was just taken; empty: none
 Result<> evaluate(const HandEyeRequest& request, const Scanner& scanner, const std::string& added) {
   const auto output = request.output.empty() ? request.from / "hand_eye.yml" : request.output;
   if (auto writable = check_writable(output); !writable) return writable;
@@ -333,11 +333,11 @@ Result<> evaluate(const HandEyeRequest& request, const Scanner& scanner, const s
   const Proposal next = more && !good ? propose(*result, *record, scanner) : Proposal();
   if (!result->findings.empty()) {
     if (!may_go_on(request) || !more) return refuse(*result, next);
-    tell(request, *result, record->looks.size(), next, {});
+    tell(request, *result, record->views.size(), next, {});
     return {};
   }
   auto written = write_file_atomically(output, write_hand_eye(to_keep(*result, scanner.board, scanner.calibration)));
-  if (written) tell(request, *result, record->looks.size(), next, output.string());
+  if (written) tell(request, *result, record->views.size(), next, output.string());
   return written;
 }
 
@@ -373,12 +373,12 @@ Result<> hand_eye_by_socket(const HandEyeRequest& request) {
   if (!board) return tl::unexpected(board.error());
   const Scanner scanner{std::move(*calibration), *board, (*source)->cameras().front()};
   if (request.pose.empty()) return evaluate(request, scanner, {});
-  const auto look = take_look(**source, request.from, request.pose, *notation);
-  if (!look) return tl::unexpected(look.error());
-  auto done = evaluate(request, scanner, look->name);
+  const auto view = take_view(**source, request.from, request.pose, *notation);
+  if (!view) return tl::unexpected(view.error());
+  auto done = evaluate(request, scanner, view->name);
   if (done) return done;
-  done.error().message += fmt::format("\n  {} is not kept", look->name);
-  if (auto dropped = drop_look(request.from, *look); !dropped) return dropped;
+  done.error().message += fmt::format("\n  {} is not kept", view->name);
+  if (auto dropped = drop_view(request.from, *view); !dropped) return dropped;
   return done;
 }
 

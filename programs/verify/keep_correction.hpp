@@ -10,7 +10,7 @@
 
 namespace slsd {
 
-/// Corrects the calibration in force by a verifier's looks at the board, if they ask for it, and prints what changed.
+/// Corrects the calibration in force by a verifier's views of the board, if they ask for it, and prints what changed.
 /// The calibration as it was before the first correction stays beside it, as FILE.uncorrected.
 /// @errors those of correct_calibration() and the files; nothing is changed then
 [[nodiscard]] Result<> keep_correction(const Verifier& verifier, const std::filesystem::path& file);

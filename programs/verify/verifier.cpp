@@ -79,9 +79,9 @@ Result<Verifier> Verifier::create(const CalibrateRequest& request, const Configu
   verifier.board_asked_for_ = !request.board.empty();
   verifier.needs_board_ = request.correct;
   verifier.correct_options_ = {!request.ruler.empty(), depths_to_predict(verifier.calibration_, configuration)};
-  verifier.looks_.projector = projector;
+  verifier.observations_.projector = projector;
   for (const CalibratedCamera& camera : verifier.calibration_.cameras) {
-    verifier.looks_.cameras.push_back({camera.name, size_of(camera.lens)});
+    verifier.observations_.cameras.push_back({camera.name, size_of(camera.lens)});
   }
   verifier.limits_.epipolar_px = epipolar_limit_px(verifier.calibration_.report.epipolar_error_px);
   if (!configuration.cameras.empty()) verifier.first_camera_ = configuration.cameras.front().name();
@@ -132,8 +132,9 @@ Result<> Verifier::look(const std::string& pose, const std::string& camera, cons
   if (needs_board_ && !remark.empty()) return fail(ErrorCode::kNotFound, remark, name);
   if (needs_board_ && !view) return fail(view.error().code, to_string(view.error()), name);
   if (view && !view->corners.empty()) {
-    if (looks_.poses.empty() || looks_.poses.back().name != pose) looks_.poses.emplace_back().name = pose;
-    looks_.poses.back().views.push_back(*view), looks_.poses.back().views.back().camera = index;
+    if (observations_.poses.empty() || observations_.poses.back().name != pose)
+      observations_.poses.emplace_back().name = pose;
+    observations_.poses.back().views.push_back(*view), observations_.poses.back().views.back().camera = index;
   }
   if (!remark.empty()) std::cout << fmt::format("{}: measured as a plain plane: {}\n", name, remark);
   const auto check = view ? check_view(*view, *known, calibration_.projector) : tl::unexpected(view.error());
@@ -147,12 +148,12 @@ Result<> Verifier::look(const std::string& pose, const std::string& camera, cons
 }
 
 Result<Correction> Verifier::find_correction() const {
-  if (looks_.poses.empty()) return fail(ErrorCode::kNotFound, "a correction needs a view of the board");
-  return correct_calibration(looks_, board_, calibration_, correct_options_);
+  if (observations_.poses.empty()) return fail(ErrorCode::kNotFound, "a correction needs a view of the board");
+  return correct_calibration(observations_, board_, calibration_, correct_options_);
 }
 
 void Verifier::check_again(const Calibration& calibration) const {
-  for (const PoseObservation& pose : looks_.poses) {
+  for (const PoseObservation& pose : observations_.poses) {
     for (const PoseView& view : pose.views) {
       const auto check = check_view(view, calibration.cameras[view.camera], calibration.projector);
       if (check) std::cout << fmt::format("after: {}\n", check_text(*check, limits_));

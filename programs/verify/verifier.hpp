@@ -19,7 +19,7 @@
 
 namespace slsd {
 
-/// Checks the calibration in force with flat objects, and prints the result of each look.
+/// Checks the calibration in force with flat objects, and prints the result of each view.
 /// @thread thread-bound
 class Verifier {
  public:
@@ -29,24 +29,24 @@ class Verifier {
   [[nodiscard]] static Result<Verifier> create(const CalibrateRequest& request, const Configuration& configuration,
                                                Pattern pattern, bool gray_code);
 
-  /// Evaluates one camera's look. Prints what cannot be measured, and does not count it.
-  /// @param pose      groups the looks of several cameras; printed before the result, with the camera
+  /// Evaluates one camera's view. Prints what cannot be measured, and does not count it.
+  /// @param pose      groups the views of several cameras; printed before the result, with the camera
   /// @param camera    its name; empty: the first configured one
   /// @param pictures  without a white one: a plain plane
   /// @errors kNotFound: the calibration does not contain the camera, or a correction needs the board, which was not
   ///         found; kMismatch: the pictures have another size
   [[nodiscard]] Result<> look(const std::string& pose, const std::string& camera, const CapturedPictures& pictures);
 
-  /// Prints the result of all looks together.
+  /// Prints the result of all views together.
   /// @errors kMismatch: the calibration no longer holds; the message says what to do; kNotFound: nothing was measured,
   ///         or the requested board was never seen
   [[nodiscard]] Result<> finish() const;
 
-  /// Finds out from the looks at the board how to correct the calibration, and prints how far off it is. Changes no
+  /// Finds out from the views of the board how to correct the calibration, and prints how far off it is. Changes no
   /// file.
   /// @errors those of correct_calibration()
   [[nodiscard]] Result<Correction> find_correction() const;
-  /// Prints the checks of the looks again, with another calibration.
+  /// Prints the checks of the views again, with another calibration.
   void check_again(const Calibration& calibration) const;
 
   [[nodiscard]] const Pattern& pattern() const { return pattern_.pattern(); }
@@ -69,7 +69,7 @@ class Verifier {
   VerifyLimits limits_;
   std::map<std::size_t, PatternReader> readers_;  // one for each camera: each remembers where its pattern lies
   std::vector<ViewCheck> checks_;
-  Observations looks_;  // at the board
+  Observations observations_;  // at the board
 };
 
 }  // namespace slsd

@@ -7,7 +7,7 @@
 
 namespace slsd {
 
-/// Takes one look at a board or a plain plane with the configured devices, and reports whether the calibration in force
+/// Takes one view of a board or a plain plane with the configured devices, and reports whether the calibration in force
 /// holds. The service must be stopped, because it owns the devices.
 /// @param request  its board and ruler
 /// @errors of the configuration and the devices; those of Verifier

@@ -18,7 +18,7 @@ std::string trueness_text(const std::optional<Trueness>& trueness, const VerifyL
                      trueness->worst_percent);
 }
 
-/// The turn that this look cannot detect.
+/// The turn that this view cannot detect.
 std::string blind_text(const ViewCheck& check) {
   if (!check.blind_axis) return "";
   Eigen::Index most = 0;

@@ -8,10 +8,10 @@
 
 namespace slsd {
 
-/// The verdict of one look on the calibration: a line for the terminal that ends in PASS or FAIL.
+/// The verdict of one view on the calibration: a line for the terminal that ends in PASS or FAIL.
 [[nodiscard]] std::string check_text(const ViewCheck& check, const VerifyLimits& limits);
 
-/// The result of all looks.
+/// The result of all views.
 [[nodiscard]] std::string summary_text(const VerifySummary& summary, const VerifyLimits& limits);
 
 /// The advice on the faults, one sentence each.

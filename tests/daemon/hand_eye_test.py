@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""slsctl hand-eye --pose, look by look, with a service whose camera sees drawn boards. The robot is in numpy."""
+"""slsctl hand-eye --pose, view by view, with a service whose camera sees drawn boards. The robot is in numpy."""
 import atexit
 import json
 import pathlib
@@ -81,7 +81,7 @@ class HandEye(unittest.TestCase):
         cls.poses = [BASE_FROM_BOARD @ numpy.linalg.inv(each) @ numpy.linalg.inv(FLANGE_FROM_RIG) for each in camera_from_board]
 
     def service_seeing(self, *looks):
-        """A service whose camera sees these looks, one after the other; None: no board."""
+        """A service whose camera sees these views, one after the other; None: no board."""
         service = Service(configuration=CONFIGURATION.format(folder=self.folder))
         frames = service.folder / "frames"
         frames.mkdir()
@@ -223,7 +223,7 @@ NOTHING = b"P5 800 600 255\n" + bytes(800 * 600)
 
 
 class TwoCameras(unittest.TestCase):
-    """A rig of two: each look has two pictures, and one of them may lack the board."""
+    """A rig of two: each view has two pictures, and one of them may lack the board."""
 
     @classmethod
     def setUpClass(cls):
@@ -241,7 +241,7 @@ class TwoCameras(unittest.TestCase):
         shutil.copy(self.folder / f"pose_{look:02}" / camera / "white.png", to)
 
     def kept_captures(self, *looks):
-        """Those looks, as the robot's program saves them."""
+        """Those views, as the robot's program saves them."""
         for look in looks:
             for camera in ("camera", "right"):
                 (self.captures / f"pose_{look:02}" / camera).mkdir(parents=True)

@@ -59,15 +59,15 @@ double scatter_of(const std::vector<Eigen::Vector2d>& places_px, const std::vect
   return components > 0 ? std::max(1.0, std::sqrt(square / components) / sigma) : 1;
 }
 
-/// The residuals of looks under a rig. Those of symbols are in their own deviations.
-struct LookResiduals {
+/// The residuals of all views under a rig. Those of symbols are in their own deviations.
+struct AllResiduals {
   std::vector<Eigen::Vector2d> corner_places, corners, symbol_places, symbols;
 };
 
-LookResiduals residuals_of_looks(const Observations& looks, const RigModel& rig) {
-  LookResiduals out;
-  for (std::size_t pose = 0; pose < looks.poses.size(); ++pose) {
-    for (const PoseView& view : looks.poses[pose].views) {
+AllResiduals residuals_of_all(const Observations& observations, const RigModel& rig) {
+  AllResiduals out;
+  for (std::size_t pose = 0; pose < observations.poses.size(); ++pose) {
+    for (const PoseView& view : observations.poses[pose].views) {
       const ViewResiduals residuals = residuals_of(view, rig, rig.rig_from_board[pose]);
       for (std::size_t i = 0; i < view.corners.size(); ++i) {
         if (view.corners[i].outlying) continue;
@@ -91,10 +91,10 @@ double sigma_of(const std::vector<Eigen::Vector2d>& residuals) {
 }
 
 /// Marks points off a rig. @return their share
-double mark_outlying(Observations& looks, const RigModel& rig, const LookNoise& noise) {
+double mark_outlying(Observations& observations, const RigModel& rig, const ViewNoise& noise) {
   double outlying = 0, all = 0;
-  for (std::size_t pose = 0; pose < looks.poses.size(); ++pose) {
-    for (PoseView& view : looks.poses[pose].views) {
+  for (std::size_t pose = 0; pose < observations.poses.size(); ++pose) {
+    for (PoseView& view : observations.poses[pose].views) {
       const ViewResiduals residuals = residuals_of(view, rig, rig.rig_from_board[pose]);
       const double limit = kOutlyingPointSigmas * std::sqrt(2.0);
       for (std::size_t i = 0; i < view.corners.size(); ++i)
@@ -125,10 +125,10 @@ Result<> check_view_of(const PoseView& view, const std::string& camera, const Bo
               camera);
 }
 
-Result<> check_views(const Observations& looks, const Board& board) {
-  for (const PoseObservation& pose : looks.poses) {
-    for (std::size_t camera = 0; camera < looks.cameras.size(); ++camera) {
-      const std::string& name = looks.cameras[camera].name;
+Result<> check_views(const Observations& observations, const Board& board) {
+  for (const PoseObservation& pose : observations.poses) {
+    for (std::size_t camera = 0; camera < observations.cameras.size(); ++camera) {
+      const std::string& name = observations.cameras[camera].name;
       const auto view = std::ranges::find(pose.views, camera, &PoseView::camera);
       if (view == pose.views.end()) {
         return fail(ErrorCode::kNotFound, "does not see the board: place it where all cameras and the projector see it",
@@ -141,11 +141,11 @@ Result<> check_views(const Observations& looks, const Board& board) {
 }
 
 /// Checks that the projector lights most of the board.
-Result<> check_lit(const Observations& looks, const RigModel& rig, const Board& board) {
+Result<> check_lit(const Observations& observations, const RigModel& rig, const Board& board) {
   const double in[] = {board.width_mm(), board.height_mm()};
-  for (std::size_t pose = 0; pose < looks.poses.size(); ++pose) {
+  for (std::size_t pose = 0; pose < observations.poses.size(); ++pose) {
     const RigidTransform rig_from_board = to_motion(rig.rig_from_board[pose]);
-    for (const PoseView& view : looks.poses[pose].views) {
+    for (const PoseView& view : observations.poses[pose].views) {
       Eigen::AlignedBox2d lit;
       for (const ProjectedPoint& symbol : view.symbols) {
         if (symbol.outlying) continue;
@@ -154,16 +154,16 @@ Result<> check_lit(const Observations& looks, const RigModel& rig, const Board& 
       }
       if (!lit.isEmpty() && lit.sizes().x() > kLitMin * in[0] && lit.sizes().y() > kLitMin * in[1]) continue;
       return fail(ErrorCode::kNotFound, "the projector lights only a part of the board: bring all of it into the light",
-                  looks.cameras[view.camera].name);
+                  observations.cameras[view.camera].name);
     }
   }
   return {};
 }
 
-/// The look with everything free: its noise, and whether the board is flat.
-struct FreeLook {
+/// The view with everything free: its noise, and whether the board is flat.
+struct FreeView {
   RigModel rig;  // as calibrated, with the places of the board
-  LookNoise noise;
+  ViewNoise noise;
 };
 
 Result<> check_flat(const DriftFit& fit, const Board& board) {
@@ -183,42 +183,41 @@ Result<> check_flat(const DriftFit& fit, const Board& board) {
                   high - low, longer_mm, kBentShareOfSide * longer_mm));
 }
 
-Result<FreeLook> free_look(Observations& looks, const Board& board, const Calibration& calibration) {
+Result<FreeView> free_view(Observations& observations, const Board& board, const Calibration& calibration) {
   const auto moved = [] {
-    return fail(
-        ErrorCode::kImpossible,
-        "the board's points contradict each other: hold it still until both pictures are taken, and look again");
+    return fail(ErrorCode::kImpossible,
+                "the board's points contradict each other: hold it still until both pictures are taken, and try again");
   };
-  FreeLook free{to_rig(calibration), {}};
+  FreeView free{to_rig(calibration), {}};
   const Eigen::AlignedBox2d sheet = board.sheet_mm();
   free.rig.shape.frame = {sheet.center(), 0.5 * std::max(board.width_mm(), board.height_mm())};
-  for (const PoseObservation& pose : looks.poses) {
+  for (const PoseObservation& pose : observations.poses) {
     const auto place = estimate_pose(pose, free.rig);
     if (!place) return moved();
     free.rig.rig_from_board.push_back(*place);
   }
   const Explanation all = everything(calibration.cameras.size());
   for (const Weighing weighing : {Weighing::kRobust, Weighing::kEqual}) {
-    const auto fit = fit_drift(looks, free.rig, all, free.noise, weighing);
+    const auto fit = fit_drift(observations, free.rig, all, free.noise, weighing);
     if (!fit) return moved();
-    const LookResiduals residuals = residuals_of_looks(looks, fit->rig);
+    const AllResiduals residuals = residuals_of_all(observations, fit->rig);
     free.noise.corner_px = std::max(sigma_of(residuals.corners), kLeastSigmaPx);
     free.noise.symbol_factor = std::max(sigma_of(residuals.symbols), 1e-3);
-    if (mark_outlying(looks, fit->rig, free.noise) > kOutlyingMax) return moved();
+    if (mark_outlying(observations, fit->rig, free.noise) > kOutlyingMax) return moved();
     free.rig.rig_from_board = fit->rig.rig_from_board;
     if (weighing == Weighing::kRobust) continue;
     free.noise.corner_px *= scatter_of(residuals.corner_places, residuals.corners, free.noise.corner_px);
     free.noise.symbol_factor *= scatter_of(residuals.symbol_places, residuals.symbols, free.noise.symbol_factor);
-    const double symbol_px = free.noise.symbol_factor * looks.poses[0].views[0].symbols[0].sigma_px;
+    const double symbol_px = free.noise.symbol_factor * observations.poses[0].views[0].symbols[0].sigma_px;
     if (free.noise.corner_px > kCornerMaxPx || symbol_px > kSymbolMaxPx) {
       return fail(ErrorCode::kImpossible,
-                  fmt::format("a turn, a shift or a change of focus do not explain the look: {:.2f} px of the corners "
+                  fmt::format("a turn, a shift or a change of focus do not explain the view: {:.2f} px of the corners "
                               "and {:.2f} px of the symbols remain. Hold the board still; if it stays, calibrate again",
                               free.noise.corner_px, symbol_px));
     }
-    if (auto lit = check_lit(looks, fit->rig, board); !lit) return tl::unexpected(lit.error());
+    if (auto lit = check_lit(observations, fit->rig, board); !lit) return tl::unexpected(lit.error());
     // Again with the noise that was found: the fit knows how certain the bend is.
-    const auto judged = fit_drift(looks, free.rig, all, free.noise, weighing);
+    const auto judged = fit_drift(observations, free.rig, all, free.noise, weighing);
     if (!judged) return moved();
     if (auto flat = check_flat(*judged, board); !flat) return tl::unexpected(flat.error());
   }
@@ -249,7 +248,7 @@ Result<> check_size_of_drift(const DriftFit& fit, double baseline_mm) {
     if (sigmas > kDriftMax) {
       return fail(
           ErrorCode::kImpossible,
-          "the rig changed by more than one look can correct: fasten projector and camera, and calibrate again");
+          "the rig changed by more than one view can correct: fasten projector and camera, and calibrate again");
     }
   }
   return {};
@@ -267,7 +266,7 @@ bool is_small(const std::vector<DeviationAt>& deviations) {
                              [](const DeviationAt& at) { return at.before_mm < kSmallShare * at.depth_mm; });
 }
 
-/// A depth at which the look does not tell how to correct. Empty: it tells at all depths. A large drift may hardly move
+/// A depth at which the view does not tell how to correct. Empty: it tells at all depths. A large drift may hardly move
 /// points at one depth, between two at which it moves them to either side: they only need to be known well there.
 const DeviationAt* uncertain_depth(const std::vector<DeviationAt>& deviations) {
   const bool small = is_small(deviations);
@@ -291,18 +290,18 @@ const DriftFit* likeliest(std::span<const DriftFit> fits) {
 
 }  // namespace
 
-Result<Correction> correct_calibration(Observations looks, const Board& board, const Calibration& calibration,
+Result<Correction> correct_calibration(Observations observations, const Board& board, const Calibration& calibration,
                                        const CorrectOptions& options) {
-  if (auto seen = check_views(looks, board); !seen) return tl::unexpected(seen.error());
-  const auto free = free_look(looks, board, calibration);
+  if (auto seen = check_views(observations, board); !seen) return tl::unexpected(seen.error());
+  const auto free = free_view(observations, board, calibration);
   if (!free) return tl::unexpected(free.error());
   std::vector<DriftFit> rigs, prints;
   for (const Explanation& explanation : explanations(calibration.cameras.size())) {
-    auto fit = fit_drift(looks, free->rig, explanation, free->noise, Weighing::kEqual);
+    auto fit = fit_drift(observations, free->rig, explanation, free->noise, Weighing::kEqual);
     if (fit) (has(explanation, Kind::kPrint) ? prints : rigs).push_back(std::move(*fit));
   }
   if (rigs.size() < 2 || prints.empty()) {
-    return fail(ErrorCode::kImpossible, "the look does not determine where the board is: tilt it, and look again");
+    return fail(ErrorCode::kImpossible, "the view does not determine where the board is: tilt it, and try again");
   }
   const DriftFit &none = rigs.front(), &best = *likeliest(rigs), &print = *likeliest(prints);
   const bool none_explains = none.explanation.empty() && none.log_evidence > best.log_evidence - kClearlyLikelier;
@@ -321,14 +320,14 @@ Result<Correction> correct_calibration(Observations looks, const Board& board, c
     if (is_small(correction.deviations)) return correction;
     return fail(
         ErrorCode::kImpossible,
-        fmt::format("this look does not tell what drifted, if anything: at {:.0f} mm, points would be corrected "
+        fmt::format("this view does not tell what drifted, if anything: at {:.0f} mm, points would be corrected "
                     "by {:.2f} mm, give or take {:.2f} mm. Bring the board nearer, so that it fills the picture, "
                     "and tilt it by 20 to 40 degrees",
                     at->depth_mm, at->before_mm, 2 * at->sigma_mm));
   }
   correction.needed = true;
-  correction.calibration = corrected(calibration, best.rig, looks.cameras);
-  correction.drift = drift_text(best.explanation, best.by, best.covariance, looks.cameras);
+  correction.calibration = corrected(calibration, best.rig, observations.cameras);
+  correction.drift = drift_text(best.explanation, best.by, best.covariance, observations.cameras);
   return correction;
 }
 

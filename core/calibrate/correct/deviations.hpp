@@ -17,7 +17,7 @@ struct DeviationAt {
 
 /// Predicts deviations of points over the field.
 /// @param calibrated  before the drift
-/// @param fits        all explanations of the look. They count by their evidence, so that the deviation includes the
+/// @param fits        all explanations of the view. They count by their evidence, so that the deviation includes the
 ///                    doubt which of them is true
 /// @param best        index of the explanation to correct by
 /// @param depths_mm   in the first camera's frame; a depth at which nothing is shared is left out

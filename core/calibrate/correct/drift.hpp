@@ -27,7 +27,7 @@ struct DriftParameter {
   friend bool operator==(const DriftParameter&, const DriftParameter&) = default;
 };
 
-/// An explanation of what a look shows: the parameters that drifted. All others stay as calibrated.
+/// An explanation of what a view shows: the parameters that drifted. All others stay as calibrated.
 using Explanation = std::vector<DriftParameter>;
 
 /// All explanations to compare, the one without any drift first. One device turned, or none; its distance changed, or
@@ -37,14 +37,14 @@ using Explanation = std::vector<DriftParameter>;
 /// @thread reentrant
 [[nodiscard]] std::vector<Explanation> explanations(std::size_t cameras);
 
-/// Every parameter that a look can show, without one that only repeats others: a moved first camera looks as if all
+/// Every parameter that a view can show, without one that only repeats others: a moved first camera looks as if all
 /// other devices had moved.
 [[nodiscard]] Explanation everything(std::size_t cameras);
 
 /// Tells whether an explanation has a parameter of a kind.
 [[nodiscard]] bool has(const Explanation& explanation, DriftParameter::Kind kind);
 
-/// Plausible size of a drift before any look: one standard deviation about 0.
+/// Plausible size of a drift before any view: one standard deviation about 0.
 /// @param baseline_mm  distance between the projector and the first camera
 [[nodiscard]] double plausible_drift(const DriftParameter& parameter, double baseline_mm);
 

@@ -33,10 +33,11 @@ struct DeviceSlopes {
 /// symbols of each view.
 class DriftEquations {
  public:
-  DriftEquations(const Observations& looks, const RigModel& rig, const Explanation& explanation, const LookNoise& noise)
-      : looks_(looks), calibrated_(rig), explanation_(explanation), noise_(noise), rig_(rig) {
-    for (const PoseObservation& pose : looks.poses) views_ += static_cast<Eigen::Index>(pose.views.size());
-    const auto poses = static_cast<Eigen::Index>(looks.poses.size());
+  DriftEquations(const Observations& observations, const RigModel& rig, const Explanation& explanation,
+                 const ViewNoise& noise)
+      : observations_(observations), calibrated_(rig), explanation_(explanation), noise_(noise), rig_(rig) {
+    for (const PoseObservation& pose : observations.poses) views_ += static_cast<Eigen::Index>(pose.views.size());
+    const auto poses = static_cast<Eigen::Index>(observations.poses.size());
     count_ = drifts() + kBend + kPlace * poses + kTogether * views_;
     by_ = Eigen::VectorXd::Zero(drifts());
     shifts_.assign(static_cast<std::size_t>(views_), {0, 0});
@@ -84,7 +85,7 @@ class DriftEquations {
     for (std::size_t i = 0; i < kSecondOrderTerms; ++i) {
       rig_.shape.terms_mm[i] += change(drifts() + static_cast<Eigen::Index>(i));
     }
-    for (std::size_t pose = 0; pose < looks_.poses.size(); ++pose) {
+    for (std::size_t pose = 0; pose < observations_.poses.size(); ++pose) {
       for (std::size_t i = 0; i < 6; ++i) {
         rig_.rig_from_board[pose][i] += change(place_column(pose) + static_cast<Eigen::Index>(i));
       }
@@ -121,8 +122,8 @@ class DriftEquations {
     hessian_ = Eigen::MatrixXd::Zero(count_, count_), gradient_ = Eigen::VectorXd::Zero(count_), cost_ = 0;
     find_device_slopes();
     std::size_t view_index = 0;
-    for (std::size_t pose = 0; pose < looks_.poses.size(); ++pose) {
-      for (const PoseView& view : looks_.poses[pose].views) {
+    for (std::size_t pose = 0; pose < observations_.poses.size(); ++pose) {
+      for (const PoseView& view : observations_.poses[pose].views) {
         if (!add_corners(view, pose, view_index, weighing)) return false;
         if (!add_symbols(view, pose, view_index++, weighing)) return false;
       }
@@ -252,10 +253,10 @@ class DriftEquations {
     }
   }
 
-  const Observations& looks_;
+  const Observations& observations_;
   const RigModel& calibrated_;
   const Explanation& explanation_;
-  const LookNoise& noise_;
+  const ViewNoise& noise_;
   RigModel rig_;
   Eigen::Index views_ = 0, count_ = 0;
   Eigen::VectorXd by_;
@@ -269,9 +270,9 @@ class DriftEquations {
 
 }  // namespace
 
-std::optional<DriftFit> fit_drift(const Observations& looks, const RigModel& rig, const Explanation& explanation,
-                                  const LookNoise& noise, Weighing weighing) {
-  DriftEquations equations(looks, rig, explanation, noise);
+std::optional<DriftFit> fit_drift(const Observations& observations, const RigModel& rig, const Explanation& explanation,
+                                  const ViewNoise& noise, Weighing weighing) {
+  DriftEquations equations(observations, rig, explanation, noise);
   for (int round = 0; round < kFitRounds; ++round) {
     const auto moved = equations.step(weighing);
     if (!moved) return std::nullopt;

@@ -38,7 +38,7 @@ struct CalibrationOutcome {
                                                           ///< cameras
   std::vector<DepthUncertainty> depth;                    ///< near, middle, far
   BoardReport board;
-  std::vector<PlaneCheck> planes;  ///< one for each camera's look at the reference plane
+  std::vector<PlaneCheck> planes;  ///< one for each camera's view of the reference plane
   std::vector<std::string> warnings;
   Verdict verdict;
 };

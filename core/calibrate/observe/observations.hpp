@@ -24,7 +24,7 @@ struct ProjectedPoint {
   bool outlying = false;
 };
 
-/// One camera's look at one pose of the board.
+/// One camera's view of one pose of the board.
 struct PoseView {
   std::size_t camera = 0;
   std::vector<BoardPoint> corners;

@@ -20,7 +20,7 @@ struct SymbolGap {
 
 /// Finds such places, of at least 5 by 5 symbols. Single unread symbols, a row hidden by ink, and symbols cut by the
 /// board's edge do not count.
-/// @param found  symbols found on the board in one look
+/// @param found  symbols found on the board in one view
 /// @param white  the picture under the white projector
 /// @thread reentrant
 [[nodiscard]] SymbolGap find_symbol_gap(const std::vector<SymbolMatch>& found, const Pattern& pattern,

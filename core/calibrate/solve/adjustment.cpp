@@ -19,10 +19,10 @@ constexpr double kOutlyingSigmas = 5;
 constexpr double kSigmaMinPx = 0.005;
 /// A print that is certainly longer along one axis than along the other by this share.
 constexpr double kStretchMin = 0.001, kStretchSigmas = 5;
-/// Two prints whose scales certainly differ by this share. A single look does not show whether the look or the print is
+/// Two prints whose scales certainly differ by this share. A single view does not show whether the view or the print is
 /// wrong.
 constexpr double kScaleMin = 0.001, kScaleSigmas = 5;
-constexpr std::size_t kLooksForScale = 2;
+constexpr std::size_t kViewsForScale = 2;
 /// A smaller change of the stretch counts as convergence.
 constexpr double kStretchSettled = 1e-5;
 
@@ -200,7 +200,7 @@ Result<> Adjustment::adjust_to_lenses(const Observations& observations) {
 }
 
 Result<> Adjustment::adjust_again(Observations& observations) {
-  options_.scale = options_.scale && observations.count(PoseSubject::kPlane) >= kLooksForScale;
+  options_.scale = options_.scale && observations.count(PoseSubject::kPlane) >= kViewsForScale;
   if (!options_.scale) rig_.board_scale = 0;
   measure_noise(observations);
   mark_outlying(observations);
@@ -210,7 +210,7 @@ Result<> Adjustment::adjust_again(Observations& observations) {
 }
 
 Result<> Adjustment::begin_with_planes(Observations& observations) {
-  options_.scale = observations.count(PoseSubject::kPlane) >= kLooksForScale;
+  options_.scale = observations.count(PoseSubject::kPlane) >= kViewsForScale;
   if (auto solved = adjust(observations, options_, rig_); !solved) return tl::unexpected(solved.error());
   return adjust_again(observations);
 }

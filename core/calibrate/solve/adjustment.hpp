@@ -28,7 +28,7 @@ class Adjustment {
   /// Determines whether the board is stretched, and adjusts again.
   [[nodiscard]] Result<> look_for_stretch(Observations& observations);
 
-  /// Continues with looks at the reference plane among the poses. With two or more looks, the board's scale is free, so
+  /// Continues with views of the reference plane among the poses. With two or more views, the board's scale is free, so
   /// that prints of different scales do not contradict each other.
   [[nodiscard]] Result<> begin_with_planes(Observations& observations);
 

@@ -30,7 +30,7 @@ constexpr double kSettledMm = 1e-6;
 constexpr double kNothingMm2 = 1e-12;
 constexpr int kDraws = 200;
 
-using Places = std::vector<std::vector<CloudLook>>;
+using Places = std::vector<std::vector<CloudView>>;
 
 /// A scanner's corners, paired with the places of the same corners in the other scanners.
 struct Pairs {
@@ -50,19 +50,19 @@ using Poses = std::vector<std::optional<RigidTransform>>;
 // Pairs a scanner's corners with the means of their places in the scanners that are already placed.
 Pairs pairs_of(std::size_t scanner, const Places& places, const Poses& poses) {
   Pairs pairs;
-  for (const auto& looks : places) {
+  for (const auto& views : places) {
     std::map<int, std::pair<Eigen::Vector3d, int>> others;
-    for (const CloudLook& look : looks) {
-      if (look.scanner == scanner || !poses[look.scanner]) continue;
-      for (const auto& corner : look.corners) {
+    for (const CloudView& view : views) {
+      if (view.scanner == scanner || !poses[view.scanner]) continue;
+      for (const auto& corner : view.corners) {
         auto& [sum, count] = others.try_emplace(corner.id, Eigen::Vector3d::Zero(), 0).first->second;
-        sum += *poses[look.scanner] * corner.point_mm;
+        sum += *poses[view.scanner] * corner.point_mm;
         ++count;
       }
     }
-    for (const CloudLook& look : looks) {
-      if (look.scanner != scanner) continue;
-      for (const auto& corner : look.corners) {
+    for (const CloudView& view : views) {
+      if (view.scanner != scanner) continue;
+      for (const auto& corner : view.corners) {
         const auto other = others.find(corner.id);
         if (other == others.end()) continue;
         pairs.from.push_back(corner.point_mm);
@@ -109,13 +109,13 @@ struct Residuals {
 
 Residuals residuals_of(const Places& places, const Poses& poses) {
   Residuals all;
-  for (const auto& looks : places) {
+  for (const auto& views : places) {
     std::map<int, std::vector<Eigen::Vector3d>> seen;
     Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-    for (const CloudLook& look : looks) {
-      if (!poses[look.scanner]) continue;
-      normal = poses[look.scanner]->rotation * look.normal;
-      for (const auto& corner : look.corners) seen[corner.id].push_back(*poses[look.scanner] * corner.point_mm);
+    for (const CloudView& view : views) {
+      if (!poses[view.scanner]) continue;
+      normal = poses[view.scanner]->rotation * view.normal;
+      for (const auto& corner : view.corners) seen[corner.id].push_back(*poses[view.scanner] * corner.point_mm);
     }
     double squares = 0;
     std::size_t count = 0;
@@ -137,38 +137,38 @@ Residuals residuals_of(const Places& places, const Poses& poses) {
   return all;
 }
 
-// The same looks with their disagreement removed.
+// The same views with their disagreement removed.
 Places agreeing(Places places, const Poses& poses) {
-  for (auto& looks : places) {
+  for (auto& views : places) {
     std::map<int, std::pair<Eigen::Vector3d, int>> sums;
-    for (const CloudLook& look : looks) {
-      for (const auto& [id, point] : look.corners) {
+    for (const CloudView& view : views) {
+      for (const auto& [id, point] : view.corners) {
         auto& [sum, count] = sums.try_emplace(id, Eigen::Vector3d::Zero(), 0).first->second;
-        sum += *poses[look.scanner] * point;
+        sum += *poses[view.scanner] * point;
         ++count;
       }
     }
-    for (CloudLook& look : looks) {
-      const RigidTransform scanner_from_first = poses[look.scanner]->inverse();
-      for (auto& [id, point] : look.corners) point = scanner_from_first * (sums[id].first / sums[id].second);
+    for (CloudView& view : views) {
+      const RigidTransform scanner_from_first = poses[view.scanner]->inverse();
+      for (auto& [id, point] : view.corners) point = scanner_from_first * (sums[id].first / sums[id].second);
     }
   }
   return places;
 }
 
-// The same looks with simulated errors of realistic size.
+// The same views with simulated errors of realistic size.
 Places with_errors(Places places, double corner_mm, std::mt19937& random) {
   std::normal_distribution<double> normal;
   const auto draw = [&] { return normal(random); };
-  for (auto& looks : places) {
-    for (CloudLook& look : looks) {
-      const Eigen::Matrix3d root = look.covariance.llt().matrixL();
+  for (auto& views : places) {
+    for (CloudView& view : views) {
+      const Eigen::Matrix3d root = view.covariance.llt().matrixL();
       const Eigen::Vector3d off = root * Eigen::Vector3d(draw(), draw(), draw());
-      for (auto& [id, point] : look.corners) {
-        const Eigen::Vector3d from_middle = point - look.middle_mm;
-        const double off_mm = off[0] + off[1] * look.along.dot(from_middle) + off[2] * look.across.dot(from_middle);
-        point *= 1 + off_mm / look.normal.dot(point);  // along the ray
-        point += corner_mm * (draw() * look.along + draw() * look.across);
+      for (auto& [id, point] : view.corners) {
+        const Eigen::Vector3d from_middle = point - view.middle_mm;
+        const double off_mm = off[0] + off[1] * view.along.dot(from_middle) + off[2] * view.across.dot(from_middle);
+        point *= 1 + off_mm / view.normal.dot(point);  // along the ray
+        point += corner_mm * (draw() * view.along + draw() * view.across);
       }
     }
   }
@@ -181,9 +181,9 @@ void estimate_sigmas(const Places& places, const Poses& poses, const Residuals& 
     std::vector<double> squares;
   };
   std::vector<Scatter> scatters(placed.scanners.size());
-  for (const auto& looks : places) {
-    for (const CloudLook& look : looks) {
-      for (const auto& corner : look.corners) scatters[look.scanner].points.push_back(corner.point_mm);
+  for (const auto& views : places) {
+    for (const CloudView& view : views) {
+      for (const auto& corner : view.corners) scatters[view.scanner].points.push_back(corner.point_mm);
     }
   }
   for (Scatter& scatter : scatters) {
@@ -219,7 +219,7 @@ void estimate_sigmas(const Places& places, const Poses& poses, const Residuals& 
 
 }  // namespace
 
-Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const BoardSighting& sighting,
+Result<CloudView> view_in_cloud(std::span<const Eigen::Vector3d> cloud, const BoardSighting& sighting,
                                 const Board& board, const Lens& lens) {
   std::vector<Tie> ties;  // points of the board, and directions without the lens's distortion
   for (const SeenPoint& point : sighting.points)
@@ -243,11 +243,11 @@ Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const Bo
   if (!plane)
     return fail(ErrorCode::kNotFound, "the cloud has no points on the board: move it into the projector's light");
 
-  CloudLook look;
-  look.normal = plane->normal;
-  look.middle_mm = plane->middle;
-  look.along = plane->normal.unitOrthogonal();
-  look.across = plane->normal.cross(look.along);
+  CloudView view;
+  view.normal = plane->normal;
+  view.middle_mm = plane->middle;
+  view.along = plane->normal.unitOrthogonal();
+  view.across = plane->normal.cross(view.along);
   // An error common to a part of the board is no noise of its points: the scatter of the parts shows how well the plane
   // is known.
   std::map<int, std::pair<Eigen::Vector4d, int>> parts;
@@ -256,7 +256,7 @@ Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const Bo
                      kPartsAcross * static_cast<int>(places[i].y() / height * kPartsDown);
     auto& [sum, count] = parts.try_emplace(part, Eigen::Vector4d::Zero(), 0).first->second;
     const Eigen::Vector3d from_middle = points[i] - plane->middle;
-    sum += Eigen::Vector4d(1, look.along.dot(from_middle), look.across.dot(from_middle), plane->off_mm(points[i]));
+    sum += Eigen::Vector4d(1, view.along.dot(from_middle), view.across.dot(from_middle), plane->off_mm(points[i]));
     ++count;
   }
   std::erase_if(parts, [](const auto& part) { return part.second.second < kPointsOfAPart; });
@@ -273,29 +273,29 @@ Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const Bo
     design += mean.head<3>() * mean.head<3>().transpose();
     squares += mean[3] * mean[3];
   }
-  look.bend_mm = std::sqrt(squares / part_count);
-  look.covariance = squares / (part_count - 3) * design.inverse();
-  if (const double most_mm = kBendMax * plane->middle.norm(); look.bend_mm > most_mm) {
+  view.bend_mm = std::sqrt(squares / part_count);
+  view.covariance = squares / (part_count - 3) * design.inverse();
+  if (const double most_mm = kBendMax * plane->middle.norm(); view.bend_mm > most_mm) {
     char text[160];
     std::snprintf(text, sizeof text,
                   "the board is not flat in the cloud: its parts are %.2f mm off a plane (at most %.2f); use a stiff "
                   "one, or calibrate this scanner again",
-                  look.bend_mm, most_mm);
+                  view.bend_mm, most_mm);
     return fail(ErrorCode::kMismatch, text);
   }
   Eigen::Vector3d mean = Eigen::Vector3d::Zero(), mean_on_board = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < ties.size(); ++i) {
-    look.corners.push_back({sighting.points[i].id, plane->meet(ties[i].pixel)});
-    mean += look.corners[i].point_mm / static_cast<double>(ties.size());
+    view.corners.push_back({sighting.points[i].id, plane->meet(ties[i].pixel)});
+    mean += view.corners[i].point_mm / static_cast<double>(ties.size());
     mean_on_board += board.point(sighting.points[i].id) / static_cast<double>(ties.size());
   }
   double measured = 0, said = 0;
-  for (const auto& [id, point] : look.corners) {
+  for (const auto& [id, point] : view.corners) {
     measured += (point - mean).squaredNorm();
     said += (board.point(id) - mean_on_board).squaredNorm();
   }
-  look.scale_percent = 100 * (std::sqrt(measured / said) - 1);
-  return look;
+  view.scale_percent = 100 * (std::sqrt(measured / said) - 1);
+  return view;
 }
 
 Result<PlacedScanners> place_scanners(const Places& places, const std::vector<std::string>& names) {
@@ -311,8 +311,8 @@ Result<PlacedScanners> place_scanners(const Places& places, const std::vector<st
           names[i]);
     }
     placed.scanners[i].first_from_scanner = *poses[i];
-    placed.scanners[i].places = static_cast<std::size_t>(std::ranges::count_if(places, [&](const auto& looks) {
-      return looks.size() > 1 && std::ranges::find(looks, i, &CloudLook::scanner) != looks.end();
+    placed.scanners[i].places = static_cast<std::size_t>(std::ranges::count_if(places, [&](const auto& views) {
+      return views.size() > 1 && std::ranges::find(views, i, &CloudView::scanner) != views.end();
     }));
   }
   const Residuals found = residuals_of(places, poses);

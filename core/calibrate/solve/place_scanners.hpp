@@ -17,7 +17,7 @@ namespace slsd {
 
 /// Place of a board in a scanner's cloud: the corners' rays, intersected with the plane of the cloud on the board. The
 /// print's scale has no effect, and the matched data is the same that will be merged.
-struct CloudLook {
+struct CloudView {
   struct Corner {
     int id = 0;                ///< id as in Board::point()
     Eigen::Vector3d point_mm;  ///< place in the scanner's frame
@@ -37,7 +37,7 @@ struct CloudLook {
 /// @param lens   lens of that camera
 /// @errors kNotFound: too few points of the cloud are on the board; kMismatch: these points are not flat
 /// @thread reentrant
-[[nodiscard]] Result<CloudLook> look_in_cloud(std::span<const Eigen::Vector3d> cloud, const BoardSighting& sighting,
+[[nodiscard]] Result<CloudView> view_in_cloud(std::span<const Eigen::Vector3d> cloud, const BoardSighting& sighting,
                                               const Board& board, const Lens& lens);
 
 struct PlacedScanner {
@@ -54,11 +54,11 @@ struct PlacedScanners {
 };
 
 /// Places several scanners by a board that at least two of them saw at each place.
-/// @param places  for each place, the scanners' looks at the same board
+/// @param places  for each place, the scanners' views of the same board
 /// @param names   names of the scanners
 /// @errors kNotFound: a scanner shares no place with those connected to the first
 /// @thread reentrant
-[[nodiscard]] Result<PlacedScanners> place_scanners(const std::vector<std::vector<CloudLook>>& places,
+[[nodiscard]] Result<PlacedScanners> place_scanners(const std::vector<std::vector<CloudView>>& places,
                                                     const std::vector<std::string>& names);
 
 }  // namespace slsd

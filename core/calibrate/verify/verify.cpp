@@ -57,7 +57,7 @@ std::vector<MeasuredSymbol> measure(const PoseView& view, const CalibratedCamera
   return out.empty() ? out : without_misread(std::move(out));
 }
 
-/// Ratio of the symbols' noise in this look to the assumed noise, as on a printed board. It compares the residuals from
+/// Ratio of the symbols' noise in this view to the assumed noise, as on a printed board. It compares the residuals from
 /// the plane, without a smooth bend, with the expected ones.
 double noise_factor(const std::vector<MeasuredSymbol>& symbols, const PlaneFit& plane) {
   const auto rows = static_cast<Eigen::Index>(plane.on_plane.size());
@@ -86,7 +86,7 @@ double expected_rms_mm(const std::vector<MeasuredSymbol>& symbols, const PlaneFi
   return noise_factor(symbols, plane) * std::sqrt(sum);
 }
 
-/// Finds the turn of the projector that best explains the symbols' distances from their epipolar lines. A look may not
+/// Finds the turn of the projector that best explains the symbols' distances from their epipolar lines. A view may not
 /// show a turn about some axis, and none shows a turn along the lines; the result names that axis.
 void find_turn(const std::vector<MeasuredSymbol>& symbols, const CalibratedCamera& camera, const Lens& projector,
                ViewCheck& check) {

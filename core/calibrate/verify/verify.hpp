@@ -22,7 +22,7 @@ struct VerifyLimits {
   double turn_deg = 0.03;                                ///< apparent turn between projector and camera
 };
 
-/// Check of the calibration by one camera's look at a flat object. Root mean squares.
+/// Check of the calibration by one camera's view of a flat object. Root mean squares.
 struct ViewCheck {
   std::size_t symbols = 0;                    ///< number of used symbols
   std::size_t left_out = 0;                   ///< misread, or off the plane
@@ -32,7 +32,7 @@ struct ViewCheck {
   double turn_sigma_deg = 0;                  ///< one standard deviation of the turn
   std::optional<Eigen::Vector3d> blind_axis;  ///< projector's axis about which a turn is not visible here
   double plane_rms_mm = 0;                    ///< symbols off their plane
-  double plane_sigma_mm = 0;                  ///< expected value of plane_rms_mm from the symbols' noise in this look
+  double plane_sigma_mm = 0;                  ///< expected value of plane_rms_mm from the symbols' noise in this view
   std::optional<Trueness> trueness;           ///< empty without a board
 
   [[nodiscard]] double plane_limit_mm(const VerifyLimits& limits) const;

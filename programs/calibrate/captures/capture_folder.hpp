@@ -42,9 +42,9 @@ enum class WhitePicture { kNeeded, kOptional };
 [[nodiscard]] Result<std::vector<CapturedPose>> list_captures(const std::filesystem::path& folder,
                                                               WhitePicture white = WhitePicture::kNeeded);
 
-/// Lists the captures, followed by the looks at the reference plane in DIR/plane_NN, if any.
+/// Lists the captures, followed by the views of the reference plane in DIR/plane_NN, if any.
 /// @param knows_plane  whether its print is known
-/// @errors kInvalidArgument: there are looks at an unknown plane
+/// @errors kInvalidArgument: there are views of an unknown plane
 [[nodiscard]] Result<std::vector<CapturedPose>> list_captures_with_planes(const std::filesystem::path& folder,
                                                                           bool knows_plane);
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/calibrate/observe/observations.hpp"
-#include "programs/calibrate/session/guide/board_look.hpp"
 #include "programs/calibrate/session/guide/board_place.hpp"
+#include "programs/calibrate/session/guide/board_view.hpp"
 
 namespace slsd {
 

@@ -230,7 +230,7 @@ class CaptureReader {
   bool gray_code_;
   PoseObservers& observers_;
   const std::function<void(const std::string&)>& report_;
-  std::map<std::pair<std::string, std::size_t>, ImageSize> sizes_;  // of each look
+  std::map<std::pair<std::string, std::size_t>, ImageSize> sizes_;  // of each view
   std::vector<Look> looks_;                                         // of a pattern
   std::vector<Look> doubts_;  // those whose print does not show in their own pattern picture
   std::size_t jpegs_ = 0;

@@ -88,7 +88,7 @@ std::string plane_cells(const std::optional<ViewCheck>& check) {
   return fmt::format("<td>{:.3f}</td><td>{:.3f}</td>", check->plane_rms_mm, check->plane_sigma_mm) + distances;
 }
 
-/// The results of the looks at the reference plane, before and after they took part.
+/// The results of the views of the reference plane, before and after they took part.
 std::string planes_of(const CalibrationOutcome& outcome) {
   if (outcome.planes.empty()) return {};
   std::string html =

@@ -7,12 +7,12 @@
 #include <fmt/format.h>
 
 #include "programs/calibrate/session/guide/coverage_text.hpp"
-#include "programs/calibrate/session/guide/look_text.hpp"
+#include "programs/calibrate/session/guide/view_text.hpp"
 
 namespace slsd {
 namespace {
 
-constexpr double kStillPx = 0.3;  // movement between two looks
+constexpr double kStillPx = 0.3;  // movement between two views
 constexpr double kGonePx = 5;     // movement that makes a handled pose a new one
 
 /// The board's place in the projector's image, because the operator looks at the board.
@@ -52,18 +52,18 @@ Result<> PoseSession::run() {
 }
 
 Result<> PoseSession::step() {
-  auto look = parts_.taker.look();
-  if (!look) return bear(look.error());
+  auto view = parts_.taker.look();
+  if (!view) return bear(view.error());
   bear_until_.reset();
   if (!sized_) {
-    if (auto sizes = parts_.poses.set_sizes(look->pictures); !sizes) return sizes;
+    if (auto sizes = parts_.poses.set_sizes(view->pictures); !sizes) return sizes;
   }
   begun_ = sized_ = true;
-  const double moved = moved_px(last_, look->sightings);
-  if (handled_ && is_seen(look->sightings) && !(moved_px(*handled_, look->sightings) < kGonePx)) handled_.reset();
-  watch_for_board(look->sightings);
-  show_state(look->sightings, moved);
-  last_ = std::move(look->sightings);
+  const double moved = moved_px(last_, view->sightings);
+  if (handled_ && is_seen(view->sightings) && !(moved_px(*handled_, view->sightings) < kGonePx)) handled_.reset();
+  watch_for_board(view->sightings);
+  show_state(view->sightings, moved);
+  last_ = std::move(view->sightings);
   if (!(moved < kStillPx) || handled_ || parts_.time.now() < next_attempt_) return {};
   return attempt(last_);
 }
@@ -104,7 +104,7 @@ void PoseSession::show_state(const BoardSightings& sightings, double moved) {
   const std::string next = is_board ? "show another pose" : "hold the plane in another place";
   parts_.terminal.live(
       fmt::format("{} {} of {}: {} ({})", is_board ? "pose" : "plane", parts_.poses.size() + 1, options_.poses,
-                  state == "done" ? next : state, look_text(sightings, parts_.source.cameras())),
+                  state == "done" ? next : state, view_text(sightings, parts_.source.cameras())),
       state);
   parts_.progress({state, {}, options_.poses, parts_.poses, sightings});
 }

@@ -50,7 +50,7 @@ struct PoseSessionParts {
 
 /// Takes poses of a board that a person holds, without any key:
 ///
-///     white ---> board seen, still for two looks ---> "hold" ---> white, pattern, white ---> kept, "taken"
+///     white ---> board seen, still for two views ---> "hold" ---> white, pattern, white ---> kept, "taken"
 ///       ^  \-> not seen, moves                |                          \-> refused, "again"
 ///       |                                     \-> as an earlier pose, "again"          |
 ///       \------------------------------------------------------------------------------/
@@ -77,7 +77,7 @@ class PoseSession {
 
   PoseSessionParts parts_;
   PoseSessionOptions options_;
-  BoardSightings last_;                    // of the previous look
+  BoardSightings last_;                    // of the previous view
   std::optional<BoardSightings> handled_;  // those that need no new attempt until the board moves
   MonotonicTime next_attempt_{};
   MonotonicTime tell_at_{};                  // time for advice that no board was seen for long

@@ -66,7 +66,7 @@ Result<std::vector<GreyImage>> PoseTaker::grab_under(const Grey8& image) {
   return source_.grab();
 }
 
-Result<BoardLook> PoseTaker::look() {
+Result<BoardView> PoseTaker::look() {
   auto pictures = grab_under(white_);
   if (!pictures) return tl::unexpected(pictures.error());
   return look_for_board(std::move(*pictures), observer_.board());
@@ -97,7 +97,7 @@ Result<PoseView> PoseTaker::judge(std::size_t camera, const Result<BoardSighting
   return view;
 }
 
-Result<PoseTrial> PoseTaker::take(BoardLook before, const PoseCollection& taken) {
+Result<PoseTrial> PoseTaker::take(BoardView before, const PoseCollection& taken) {
   PoseTrial trial;
   for (GreyImage& white : before.pictures) trial.pictures.push_back({std::move(white), {}, std::nullopt});
   if (auto projected = project(trial.pictures); !projected) return tl::unexpected(projected.error());

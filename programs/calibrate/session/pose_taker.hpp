@@ -9,7 +9,7 @@
 #include "programs/calibrate/captures/captured_pictures.hpp"
 #include "programs/calibrate/captures/pose_collection.hpp"
 #include "programs/calibrate/captures/pose_observer.hpp"
-#include "programs/calibrate/session/guide/board_look.hpp"
+#include "programs/calibrate/session/guide/board_view.hpp"
 #include "programs/calibrate/session/pose_source.hpp"
 
 namespace slsd {
@@ -35,12 +35,12 @@ class PoseTaker {
   PoseTaker(PoseSource& source, PoseObserver& observer, std::vector<Grey8> images, bool gray_code);
 
   /// Shows white light and looks at the board. @errors of PoseSource::grab()
-  [[nodiscard]] Result<BoardLook> look();
+  [[nodiscard]] Result<BoardView> look();
 
   /// @param before  a look() at the board, held still
   /// @param taken   the poses so far, as a reference for blur
   /// @errors of PoseSource::grab()
-  [[nodiscard]] Result<PoseTrial> take(BoardLook before, const PoseCollection& taken);
+  [[nodiscard]] Result<PoseTrial> take(BoardView before, const PoseCollection& taken);
 
  private:
   [[nodiscard]] Result<std::vector<GreyImage>> grab_under(const Grey8& image);

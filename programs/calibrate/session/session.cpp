@@ -109,7 +109,7 @@ Result<> take_poses(const CalibrateRequest& request, const Preparation& prepared
   return PoseSession(std::move(parts), options).run();
 }
 
-/// Takes the poses, then the looks at the reference plane; includes those recorded earlier.
+/// Takes the poses, then the views of the reference plane; includes those recorded earlier.
 Result<Observations> take_all(const CalibrateRequest& request, const Preparation& prepared, PoseSource& source,
                               PoseObservers& observers, PoseRecorder& recorder, const Observations& recorded) {
   PoseCollection poses(prepared.board, recorded);

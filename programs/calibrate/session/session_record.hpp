@@ -26,7 +26,7 @@ namespace slsd {
 /// @errors of the files; kMismatch: the recorded pattern is for another projector size
 [[nodiscard]] Result<Pattern> session_pattern(const std::filesystem::path& folder, const Configuration& configuration);
 
-/// Reads the observations of the earlier poses, and of the looks at the reference plane. Empty if there are none.
+/// Reads the observations of the earlier poses, and of the views of the reference plane. Empty if there are none.
 /// @errors of list_captures_with_planes() and read_captures(); kMismatch: the earlier poses use the other code
 [[nodiscard]] Result<ReadCaptures> read_record(const std::filesystem::path& folder,
                                                const std::vector<std::string>& cameras, const ImageSize& projector,

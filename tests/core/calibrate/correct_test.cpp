@@ -47,8 +47,8 @@ struct SheetOptions {
   double lit = 1;
 };
 
-/// Looks at a board near the middle of what camera and projector share.
-Observations sheet_look(const RigModel& rig, std::uint32_t seed, const SheetOptions& options = {}) {
+/// Views of a board near the middle of what camera and projector share.
+Observations sheet_view(const RigModel& rig, std::uint32_t seed, const SheetOptions& options = {}) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> any(-1, 1);
@@ -134,9 +134,9 @@ RigModel turned_projector(double degrees) {
                     {by.x(), by.y(), by.z()});
 }
 
-Result<Correction> corrected_by(const Observations& looks, const RigModel& calibrated, bool print_measured = false,
-                                const char* board = kSheet) {
-  return correct_calibration(looks, *parse_board(board), calibration_of(calibrated),
+Result<Correction> corrected_by(const Observations& observations, const RigModel& calibrated,
+                                bool print_measured = false, const char* board = kSheet) {
+  return correct_calibration(observations, *parse_board(board), calibration_of(calibrated),
                              {print_measured, {750, 1000, 1500}});
 }
 
@@ -146,15 +146,15 @@ double quantile_of(std::vector<double> values, double share) {
 }
 
 // Numeric: the evidence of one free number is the integral, over that number, of its prior times the probability of the
-// look if the rig were calibrated with it.
+// view if the rig were calibrated with it.
 TEST(FitDrift, HasTheEvidenceThatIntegrationGives) {
-  const Observations looks = sheet_look(drifted_by(true_rig(), {{Drift::kFocus, 0}}, {0.0004}), 1);
+  const Observations observations = sheet_view(drifted_by(true_rig(), {{Drift::kFocus, 0}}, {0.0004}), 1);
   RigModel rig = true_rig();
   rig.shape.frame = {{180, 110}, 180};
-  rig.rig_from_board.push_back(*estimate_pose(looks.poses[0], rig));
+  rig.rig_from_board.push_back(*estimate_pose(observations.poses[0], rig));
   const Explanation focus{{Drift::kFocus, 0}};
-  const LookNoise noise{0.03, 1.6};
-  const auto fit = fit_drift(looks, rig, focus, noise, Weighing::kEqual);
+  const ViewNoise noise{0.03, 1.6};
+  const auto fit = fit_drift(observations, rig, focus, noise, Weighing::kEqual);
   ASSERT_TRUE(fit);
   const double sigma = std::sqrt(fit->covariance(0, 0)), prior = plausible_drift(focus[0], 178);
   constexpr int kSteps = 40;
@@ -162,7 +162,7 @@ TEST(FitDrift, HasTheEvidenceThatIntegrationGives) {
   double sum = 0;
   for (int i = -kSteps; i <= kSteps; ++i) {
     const double off = kReach * i / kSteps * sigma, value = fit->by(0) + off;
-    const auto fixed = fit_drift(looks, drifted_by(rig, focus, {value}), {}, noise, Weighing::kEqual);
+    const auto fixed = fit_drift(observations, drifted_by(rig, focus, {value}), {}, noise, Weighing::kEqual);
     ASSERT_TRUE(fixed);
     const double density = std::exp(-0.5 * value * value / (prior * prior)) / (prior * std::sqrt(2 * std::numbers::pi));
     sum += density * std::exp(fixed->log_evidence - fit->log_evidence) * kReach / kSteps * sigma;
@@ -175,23 +175,23 @@ TEST(FitDrift, RecoversADriftFromExactPoints) {
                           {Drift::kShift, -1, 1}, {Drift::kShift, -1, 2}, {Drift::kFocus, 0}};
   const std::vector<double> truth{0.002, -0.001, 0.003, 0.8, -0.3, 0.5, 0.004};
   RigModel now = drifted(true_rig(), moved, Eigen::Map<const Eigen::VectorXd>(truth.data(), 7));
-  const Observations looks = sheet_look(now, 3, {.corner_px = 0, .symbol_px = 0, .together_px = 0});
+  const Observations observations = sheet_view(now, 3, {.corner_px = 0, .symbol_px = 0, .together_px = 0});
   RigModel rig = true_rig();
   rig.shape.frame = {{180, 110}, 180};
-  rig.rig_from_board.push_back(*estimate_pose(looks.poses[0], rig));
-  const auto fit = fit_drift(looks, rig, moved, {1e-4, 2e-3}, Weighing::kEqual);
+  rig.rig_from_board.push_back(*estimate_pose(observations.poses[0], rig));
+  const auto fit = fit_drift(observations, rig, moved, {1e-4, 2e-3}, Weighing::kEqual);
   ASSERT_TRUE(fit);
   for (std::size_t i = 0; i < truth.size(); ++i) {
     EXPECT_NEAR(fit->by(static_cast<Eigen::Index>(i)), truth[i], 2e-3 * std::abs(truth[i])) << i;
   }
 }
 
-TEST(CorrectCalibration, FreesOnlyWhatTheLookAsksFor) {
-  const auto turned = corrected_by(sheet_look(turned_projector(0.1), 5), true_rig());
+TEST(CorrectCalibration, FreesOnlyWhatTheViewAsksFor) {
+  const auto turned = corrected_by(sheet_view(turned_projector(0.1), 5), true_rig());
   ASSERT_TRUE(turned) << turned.error().message;
   ASSERT_TRUE(turned->needed);
   EXPECT_THAT(turned->drift, MatchesRegex("the projector turned by 0\\.(10|09).* degrees"));
-  const auto focused = corrected_by(sheet_look(drifted_by(true_rig(), {{Drift::kFocus, 0}}, {-0.005}), 6), true_rig());
+  const auto focused = corrected_by(sheet_view(drifted_by(true_rig(), {{Drift::kFocus, 0}}, {-0.005}), 6), true_rig());
   ASSERT_TRUE(focused) << focused.error().message;
   ASSERT_TRUE(focused->needed);
   EXPECT_THAT(focused->drift, MatchesRegex("the focal length of the camera is 0\\.(50|49).* % shorter"));
@@ -201,7 +201,7 @@ TEST(CorrectCalibration, KeepsTheReportAndTheNames) {
   Calibration calibration = calibration_of(true_rig());
   calibration.report.board = kSheet;
   const auto correction =
-      correct_calibration(sheet_look(turned_projector(0.1), 5), *parse_board(kSheet), calibration, {false, {1000}});
+      correct_calibration(sheet_view(turned_projector(0.1), 5), *parse_board(kSheet), calibration, {false, {1000}});
   ASSERT_TRUE(correction) << correction.error().message;
   EXPECT_EQ(correction->calibration.report.board, kSheet);
   EXPECT_EQ(correction->calibration.cameras[0].name, "left");
@@ -213,14 +213,14 @@ TEST(CorrectCalibration, KeepsTheReportAndTheNames) {
 TEST(CorrectCalibration, NamesTheCameraThatTurned) {
   const RigModel rig = true_rig(2);
   const Explanation turn{{Drift::kTurn, 1, 0}, {Drift::kTurn, 1, 1}, {Drift::kTurn, 1, 2}};
-  const auto correction = corrected_by(sheet_look(drifted_by(rig, turn, {0.001, 0.002, 0}), 2), rig);
+  const auto correction = corrected_by(sheet_view(drifted_by(rig, turn, {0.001, 0.002, 0}), 2), rig);
   ASSERT_TRUE(correction) << correction.error().message;
   ASSERT_TRUE(correction->needed);
   EXPECT_THAT(correction->drift, StartsWith("camera right turned by 0.128"));
 }
 
 TEST(CorrectCalibration, LeavesACalibrationThatHolds) {
-  const auto correction = corrected_by(sheet_look(true_rig(), 9), true_rig());
+  const auto correction = corrected_by(sheet_view(true_rig(), 9), true_rig());
   ASSERT_TRUE(correction) << correction.error().message;
   EXPECT_FALSE(correction->needed);
   EXPECT_THAT(correction->drift, IsEmpty());
@@ -228,8 +228,8 @@ TEST(CorrectCalibration, LeavesACalibrationThatHolds) {
   EXPECT_LT(correction->deviations[1].before_mm, 0.2);
 }
 
-std::string refusal(const Observations& looks, const RigModel& calibrated, ErrorCode code) {
-  const auto correction = corrected_by(looks, calibrated);
+std::string refusal(const Observations& observations, const RigModel& calibrated, ErrorCode code) {
+  const auto correction = corrected_by(observations, calibrated);
   if (correction) return correction->needed ? "corrected: " + correction->drift : "holds";
   EXPECT_EQ(correction.error().code, code);
   return to_string(correction.error());
@@ -237,19 +237,19 @@ std::string refusal(const Observations& looks, const RigModel& calibrated, Error
 
 TEST(CorrectCalibration, RefusesABoardOfAnotherSize) {
   for (const double print : {0.97, 0.985, 0.995, 1.005, 1.03}) {
-    EXPECT_THAT(refusal(sheet_look(true_rig(), 4, {.print = print}), true_rig(), ErrorCode::kMismatch),
+    EXPECT_THAT(refusal(sheet_view(true_rig(), 4, {.print = print}), true_rig(), ErrorCode::kMismatch),
                 HasSubstr("another print"))
         << print;
   }
-  EXPECT_THAT(refusal(sheet_look(turned_projector(0.1), 4, {.print = 0.97}), true_rig(), ErrorCode::kMismatch),
+  EXPECT_THAT(refusal(sheet_view(turned_projector(0.1), 4, {.print = 0.97}), true_rig(), ErrorCode::kMismatch),
               HasSubstr("another print"))
       << "and turned";
 }
 
 TEST(CorrectCalibration, BelievesAPrintThatWasMeasured) {
   const RigModel now = drifted_by(true_rig(), {{Drift::kDistance}}, {1});
-  EXPECT_THAT(refusal(sheet_look(now, 4), true_rig(), ErrorCode::kMismatch), HasSubstr("farther from each other"));
-  const auto correction = corrected_by(sheet_look(now, 4), true_rig(), true);
+  EXPECT_THAT(refusal(sheet_view(now, 4), true_rig(), ErrorCode::kMismatch), HasSubstr("farther from each other"));
+  const auto correction = corrected_by(sheet_view(now, 4), true_rig(), true);
   ASSERT_TRUE(correction) << correction.error().message;
   EXPECT_TRUE(correction->needed);
   EXPECT_LT(plane_error(now, correction->calibration, 1500).rms_mm, 0.3);
@@ -257,7 +257,7 @@ TEST(CorrectCalibration, BelievesAPrintThatWasMeasured) {
 
 TEST(CorrectCalibration, RefusesABentBoard) {
   for (const double bend_mm : {1.5, -1.5, 4.0}) {
-    EXPECT_THAT(refusal(sheet_look(turned_projector(0.1), 4, {.bend_mm = bend_mm}), true_rig(), ErrorCode::kImpossible),
+    EXPECT_THAT(refusal(sheet_view(turned_projector(0.1), 4, {.bend_mm = bend_mm}), true_rig(), ErrorCode::kImpossible),
                 HasSubstr("the board is bent by"))
         << bend_mm;
   }
@@ -265,41 +265,42 @@ TEST(CorrectCalibration, RefusesABentBoard) {
 
 TEST(CorrectCalibration, RefusesHalfABoard) {
   const std::string half =
-      refusal(sheet_look(turned_projector(0.1), 4, {.visible = 0.5}), true_rig(), ErrorCode::kNotFound);
+      refusal(sheet_view(turned_projector(0.1), 4, {.visible = 0.5}), true_rig(), ErrorCode::kNotFound);
   EXPECT_THAT(half, HasSubstr("left: only 30 of the board's 60 points are in view"));
-  EXPECT_THAT(refusal(sheet_look(turned_projector(0.1), 4, {.lit = 0.5}), true_rig(), ErrorCode::kNotFound),
+  EXPECT_THAT(refusal(sheet_view(turned_projector(0.1), 4, {.lit = 0.5}), true_rig(), ErrorCode::kNotFound),
               HasSubstr("lights only a part of the board"));
-  EXPECT_THAT(refusal(sheet_look(turned_projector(0.1), 4, {.lit = 0.02}), true_rig(), ErrorCode::kNotFound),
+  EXPECT_THAT(refusal(sheet_view(turned_projector(0.1), 4, {.lit = 0.02}), true_rig(), ErrorCode::kNotFound),
               HasSubstr("only 33 symbols"));
 }
 
 TEST(CorrectCalibration, NeedsEveryCamera) {
-  Observations looks = sheet_look(true_rig(2), 4);
-  looks.poses[0].views.pop_back();
-  EXPECT_THAT(refusal(looks, true_rig(2), ErrorCode::kNotFound), HasSubstr("right: does not see the board"));
+  Observations observations = sheet_view(true_rig(2), 4);
+  observations.poses[0].views.pop_back();
+  EXPECT_THAT(refusal(observations, true_rig(2), ErrorCode::kNotFound), HasSubstr("right: does not see the board"));
 }
 
 TEST(CorrectCalibration, RefusesMoreThanADrift) {
-  EXPECT_THAT(refusal(sheet_look(turned_projector(4), 4), true_rig(), ErrorCode::kImpossible),
-              HasSubstr("more than one look can correct"));
+  EXPECT_THAT(refusal(sheet_view(turned_projector(4), 4), true_rig(), ErrorCode::kImpossible),
+              HasSubstr("more than one view can correct"));
 }
 
 TEST(CorrectCalibration, RefusesABoardThatMovedBetweenItsPictures) {
-  Observations looks = sheet_look(true_rig(), 4);
+  Observations observations = sheet_view(true_rig(), 4);
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0, 2);
-  for (ProjectedPoint& symbol : looks.poses[0].views[0].symbols) symbol.camera_px.x() += normal(random);
-  EXPECT_THAT(refusal(looks, true_rig(), ErrorCode::kImpossible), HasSubstr("contradict each other: hold it still"));
+  for (ProjectedPoint& symbol : observations.poses[0].views[0].symbols) symbol.camera_px.x() += normal(random);
+  EXPECT_THAT(refusal(observations, true_rig(), ErrorCode::kImpossible),
+              HasSubstr("contradict each other: hold it still"));
 }
 
 TEST(CorrectCalibration, IgnoresMisreadSymbols) {
-  Observations looks = sheet_look(turned_projector(0.1), 5);
+  Observations observations = sheet_view(turned_projector(0.1), 5);
   std::mt19937 random(3);
-  for (ProjectedPoint& symbol : looks.poses[0].views[0].symbols) {
+  for (ProjectedPoint& symbol : observations.poses[0].views[0].symbols) {
     if (random() % 10 != 0) continue;
     symbol.projector_px = {static_cast<double>(random() % 1280), static_cast<double>(random() % 800)};
   }
-  const auto correction = corrected_by(looks, true_rig());
+  const auto correction = corrected_by(observations, true_rig());
   ASSERT_TRUE(correction) << correction.error().message;
   ASSERT_TRUE(correction->needed);
   EXPECT_LT(plane_error(turned_projector(0.1), correction->calibration, 1500).rms_mm, 0.15);
@@ -323,7 +324,7 @@ RigModel drifted_rig(std::uint32_t seed, int focused) {
 /// A board for corrections, and the errors of the plane that it may leave.
 struct Sheet {
   const char *name, *board;
-  double median_mm, most_looks_mm, refused;
+  double median_mm, most_views_mm, refused;
 };
 
 /// 0.5 % of focal length, 0.1 degrees and 1 mm at once, corrected from one board at 1 m.
@@ -332,19 +333,19 @@ INSTANTIATE_TEST_SUITE_P(CorrectCalibration, CorrectFrom,
                          testing::Values(Sheet{"A3", kSheet, 0.1, 0.3, 0}, Sheet{"A4", kSmallSheet, 0.15, 0.5, 0.1}),
                          [](const auto& sheet) { return sheet.param.name; });
 
-std::uint32_t looks_asked_for() {
-  const char* text = std::getenv("SLSD_TEST_LOOKS");
+std::uint32_t views_asked_for() {
+  const char* text = std::getenv("SLSD_TEST_VIEWS");
   return text != nullptr ? static_cast<std::uint32_t>(std::clamp(std::atoi(text), 20, 10000)) : 20;
 }
 
 TEST_P(CorrectFrom, MeasuresAPlaneBeyondTheBoard) {
-  const std::uint32_t looks = looks_asked_for();
+  const std::uint32_t views = views_asked_for();
   for (const int focused : {-1, 0}) {
     std::vector<double> before, after;
     int inside = 0, refused = 0;
-    for (std::uint32_t i = 0; i < looks; ++i) {
+    for (std::uint32_t i = 0; i < views; ++i) {
       const RigModel now = drifted_rig(i, focused);
-      const Observations seen = sheet_look(now, 100 + i, {.board = GetParam().board});
+      const Observations seen = sheet_view(now, 100 + i, {.board = GetParam().board});
       const auto correction = corrected_by(seen, true_rig(), false, GetParam().board);
       if (!correction) {
         EXPECT_THAT(correction.error().message, HasSubstr("Bring the board nearer"));
@@ -358,19 +359,19 @@ TEST_P(CorrectFrom, MeasuresAPlaneBeyondTheBoard) {
     }
     std::printf(
         "%s, focus of the %s: a plane at 1500 mm is off by %.2f mm before; after by %.3f mm (median), %.3f mm (95 %%"
-        " of looks), %.3f mm at most; of %u looks %d within the interval, %d refused\n",
+        " of views), %.3f mm at most; of %u views %d within the interval, %d refused\n",
         GetParam().name, focused < 0 ? "projector" : "camera", quantile_of(before, 0.5), quantile_of(after, 0.5),
-        quantile_of(after, 0.95), quantile_of(after, 1), looks, inside, refused);
-    EXPECT_LT(quantile_of(after, 0.95), GetParam().most_looks_mm);
+        quantile_of(after, 0.95), quantile_of(after, 1), views, inside, refused);
+    EXPECT_LT(quantile_of(after, 0.95), GetParam().most_views_mm);
     EXPECT_LT(quantile_of(after, 0.5), GetParam().median_mm);
     EXPECT_GE(inside, 0.85 * static_cast<double>(after.size()));
-    EXPECT_LE(refused, GetParam().refused * looks);
+    EXPECT_LE(refused, GetParam().refused * views);
   }
 }
 
 /// Counts corrections that make planes at three depths worse.
 struct Harm {
-  int looks = 0, corrected = 0, refused = 0, worse = 0;
+  int views = 0, corrected = 0, refused = 0, worse = 0;
 
   void look_at(const RigModel& truth, const Calibration& calibration, std::uint32_t seed) {
     std::mt19937 random(seed);
@@ -379,9 +380,9 @@ struct Harm {
     };
     SheetOptions options{.distance_mm = uniform(900, 1600), .tilt_deg = uniform(0, 40)};
     options.symbol_px = uniform(0.05, 0.2), options.corner_px = uniform(0.02, 0.06);
-    const auto correction = correct_calibration(sheet_look(truth, seed, options), *parse_board(kSheet), calibration,
+    const auto correction = correct_calibration(sheet_view(truth, seed, options), *parse_board(kSheet), calibration,
                                                 {false, {options.distance_mm, 1.5 * options.distance_mm}});
-    ++looks;
+    ++views;
     refused += correction ? 0 : 1;
     if (!correction || !correction->needed) return;
     ++corrected;
@@ -397,7 +398,7 @@ struct Harm {
 TEST(CorrectCalibration, HardlyEverMakesAGoodRigWorse) {
   Harm harm;
   for (std::uint32_t i = 0; i < 200; ++i) harm.look_at(true_rig(), calibration_of(true_rig()), i);
-  std::printf("a good rig: %d looks, %d corrections, %d made it worse, %d refused\n", harm.looks, harm.corrected,
+  std::printf("a good rig: %d views, %d corrections, %d made it worse, %d refused\n", harm.views, harm.corrected,
               harm.worse, harm.refused);
   EXPECT_LE(harm.worse, 1);
   EXPECT_LE(harm.refused, 2);
@@ -413,7 +414,7 @@ TEST(CorrectCalibration, HardlyEverMakesAFreshCalibrationWorse) {
     ASSERT_TRUE(outcome) << outcome.error().message;
     for (std::uint32_t i = 0; i < 20; ++i) harm.look_at(true_rig(), outcome->calibration, 1000 * session + i);
   }
-  std::printf("fresh calibrations: %d looks, %d corrections, %d made it worse, %d refused\n", harm.looks,
+  std::printf("fresh calibrations: %d views, %d corrections, %d made it worse, %d refused\n", harm.views,
               harm.corrected, harm.worse, harm.refused);
   EXPECT_LE(harm.worse, 1);
 }

@@ -27,7 +27,7 @@ struct Errors {
   double point_mm = 0.2, corner_px = 0.03, bend_mm = 0;
 };
 
-Result<CloudLook> looked(const RigidTransform& scanner_from_board, std::size_t scanner, std::mt19937& random,
+Result<CloudView> looked(const RigidTransform& scanner_from_board, std::size_t scanner, std::mt19937& random,
                          const Errors& errors = {}) {
   std::normal_distribution<double> noise;
   BoardSighting sighting;
@@ -43,9 +43,9 @@ Result<CloudLook> looked(const RigidTransform& scanner_from_board, std::size_t s
       cloud.back() *= 1 + errors.point_mm * noise(random) / cloud.back().z();
     }
   }
-  auto look = look_in_cloud(cloud, sighting, kBoard, kLens);
-  if (look) look->scanner = scanner;
-  return look;
+  auto view = view_in_cloud(cloud, sighting, kBoard, kLens);
+  if (view) view->scanner = scanner;
+  return view;
 }
 
 std::vector<RigidTransform> three_places() {
@@ -58,18 +58,18 @@ double off_mm(const RigidTransform& found, const RigidTransform& truth, const Ei
   return (found * point - in_first).norm();
 }
 
-TEST(LookInCloud, TellsWhereTheCornersAreByTheCloudWhateverThePrintsScale) {
+TEST(ViewInCloud, TellsWhereTheCornersAreByTheCloudWhateverThePrintsScale) {
   std::mt19937 random(2);
   const RigidTransform at = three_places()[1];
-  const auto look = looked(at, 0, random);
-  ASSERT_TRUE(look) << to_string(look.error());
-  ASSERT_EQ(look->corners.size(), 60U);
-  for (const auto& [id, point] : look->corners) EXPECT_LT((point - at * kBoard.point(id)).norm(), 0.15);
-  EXPECT_NEAR(look->scale_percent, 0, 0.02);
-  EXPECT_LT(look->bend_mm, 0.1);
+  const auto view = looked(at, 0, random);
+  ASSERT_TRUE(view) << to_string(view.error());
+  ASSERT_EQ(view->corners.size(), 60U);
+  for (const auto& [id, point] : view->corners) EXPECT_LT((point - at * kBoard.point(id)).norm(), 0.15);
+  EXPECT_NEAR(view->scale_percent, 0, 0.02);
+  EXPECT_LT(view->bend_mm, 0.1);
 }
 
-TEST(LookInCloud, RefusesABoardThatIsNotFlat) {
+TEST(ViewInCloud, RefusesABoardThatIsNotFlat) {
   std::mt19937 random(2);
   const auto bent = looked(three_places()[0], 0, random, {.bend_mm = 20});
   ASSERT_FALSE(bent);
@@ -77,15 +77,15 @@ TEST(LookInCloud, RefusesABoardThatIsNotFlat) {
   EXPECT_THAT(bent.error().message, HasSubstr("not flat"));
 }
 
-TEST(LookInCloud, RefusesACloudBesideTheBoard) {
+TEST(ViewInCloud, RefusesACloudBesideTheBoard) {
   BoardSighting sighting;
   for (int id = 0; id < kBoard.point_count(); ++id)
     sighting.points.push_back({id, kLens.project(three_places()[0] * kBoard.point(id))});
   const std::vector<Eigen::Vector3d> beside(1000, {900, 0, 2000});
-  const auto look = look_in_cloud(beside, sighting, kBoard, kLens);
-  ASSERT_FALSE(look);
-  EXPECT_EQ(look.error().code, ErrorCode::kNotFound);
-  EXPECT_FALSE(look_in_cloud({}, sighting, kBoard, kLens));
+  const auto view = view_in_cloud(beside, sighting, kBoard, kLens);
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().code, ErrorCode::kNotFound);
+  EXPECT_FALSE(view_in_cloud({}, sighting, kBoard, kLens));
 }
 
 // The second and the third never see the same place: the third is reached through the first.
@@ -96,7 +96,7 @@ TEST(PlaceScanners, FindsThemWithErrorsOfTheSizeThatItSays) {
   constexpr int kTrials = 40;
   for (int trial = 0; trial < kTrials; ++trial) {
     std::mt19937 random(static_cast<unsigned>(trial));
-    std::vector<std::vector<CloudLook>> places;
+    std::vector<std::vector<CloudView>> places;
     for (std::size_t other : {1U, 2U}) {
       for (const RigidTransform& place : three_places()) {
         const RigidTransform& to = first_from[other];
@@ -124,10 +124,10 @@ TEST(PlaceScanners, FindsThemWithErrorsOfTheSizeThatItSays) {
   EXPECT_LT(std::sqrt(far), 1.5);
 }
 
-TEST(PlaceScanners, TrustsLooksThatDoNotAgreeLess) {
+TEST(PlaceScanners, TrustsViewsThatDoNotAgreeLess) {
   std::mt19937 random(7);
   const RigidTransform first_from_second = moved(640, -60, 110, -17, {0.1, 1, 0.05});
-  std::vector<std::vector<CloudLook>> good, bad;
+  std::vector<std::vector<CloudView>> good, bad;
   for (const RigidTransform& place : three_places()) {
     const auto one = looked(place, 0, random);
     auto two = looked(first_from_second.inverse().after(place), 1, random);

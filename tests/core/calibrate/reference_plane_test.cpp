@@ -155,7 +155,7 @@ TEST(ReferencePlane, DoesNotTakePartInTheStretchOfTheBoard) {
   EXPECT_EQ(report_of(outcome, "plane_0").outlying_corners, 0U);
 }
 
-TEST(ReferencePlane, NamesLooksThatAreBentOrShowTooLittle) {
+TEST(ReferencePlane, NamesViewsThatAreBentOrShowTooLittle) {
   SightOptions options;
   options.relief = [](int pose, const Eigen::Vector2d& mm) {
     return pose == 1 ? 4 * std::pow((mm.x() - 225) / 225, 2) : 0;
@@ -176,7 +176,7 @@ TEST(ReferencePlane, NamesLooksThatAreBentOrShowTooLittle) {
   EXPECT_FALSE(outcome.planes[0].after);
 }
 
-TEST(ReferencePlane, NamesALookThatMoved) {
+TEST(ReferencePlane, NamesAViewThatMoved) {
   SightOptions options;
   options.moved = [](int pose, const MotionVector& before) {
     MotionVector after = before;
@@ -188,7 +188,7 @@ TEST(ReferencePlane, NamesALookThatMoved) {
   EXPECT_EQ(outcome.observations.count(PoseSubject::kPlane), 2U);
 }
 
-TEST(ReferencePlane, IsNoMeasureByOneLookThatContradicts) {
+TEST(ReferencePlane, IsNoMeasureByOneViewThatContradicts) {
   Observations observations = look_at(true_rig(), true_poses(kPoses));
   add_planes(true_rig(), {kPlaces[1]}, {}, observations, 1.01);
   const CalibrationOutcome outcome = calibrated(std::move(observations));

@@ -64,13 +64,13 @@ TEST(CheckView, ExpectsThePlaneToBeAsFlatAsTheNoiseLetsIt) {
 }
 
 // Symbols on a printed board are noisier than they say of themselves.
-TEST(CheckView, HasNoFalseAlarmInTwoHundredLooks) {
-  int looks = 0;
+TEST(CheckView, HasNoFalseAlarmInTwoHundredViews) {
+  int views = 0;
   for (const double noise_px : {0.05, 0.1, 0.15, 0.2}) {
     SightOptions options;
     options.symbol_sigma_px = noise_px, options.seed = static_cast<std::uint32_t>(1000 * noise_px);
     for (const PoseView& view : views_of(see(true_rig(), true_poses(50, options.seed), options))) {
-      EXPECT_THAT(faults(view), IsEmpty()) << "look " << ++looks << ", symbols off by " << noise_px << " px";
+      EXPECT_THAT(faults(view), IsEmpty()) << "view " << ++views << ", symbols off by " << noise_px << " px";
     }
   }
 }

@@ -30,35 +30,35 @@ class Recorded {
       : simulated_(simulate(robot, seed)), random_(seed) {
     record.mounted = robot.mounted;
     record.notation = *pose_notation(notation);
-    for (const HandEyeLook& look : simulated_.session.looks)
-      record.looks.push_back({look.name, robot_numbers(look.base_from_flange, record.notation), look.board});
+    for (const HandEyeView& view : simulated_.session.views)
+      record.views.push_back({view.name, robot_numbers(view.base_from_flange, record.notation), view.board});
     record.shared = simulated_.session.shared;
     record.corner_px = simulated_.session.corner_px;
   }
 
   /// Writes other poses down.
   void rewrite(const std::function<RigidTransform(std::size_t, const RigidTransform&)>& change) {
-    for (std::size_t i = 0; i < record.looks.size(); ++i) {
-      const RigidTransform pose = change(i, simulated_.session.looks[i].base_from_flange);
-      record.looks[i].pose = robot_numbers(pose, record.notation);
+    for (std::size_t i = 0; i < record.views.size(); ++i) {
+      const RigidTransform pose = change(i, simulated_.session.views[i].base_from_flange);
+      record.views[i].pose = robot_numbers(pose, record.notation);
     }
   }
 
-  /// Takes the pictures again from one look on, with scanner or board moved where they sit.
+  /// Takes the pictures again from one view on, with scanner or board moved where they sit.
   void move_from(std::size_t first, const RigidTransform& scanner, const RigidTransform& board) {
-    for (std::size_t i = first; i < record.looks.size(); ++i) {
+    for (std::size_t i = first; i < record.views.size(); ++i) {
       const RigidTransform robot = mount_from_stand(record.mounted, simulated_.base_from_flange[i]);
       const RigidTransform rig_from_board =
           simulated_.places.mount_from_rig.after(scanner).inverse().after(robot).after(board).after(
               simulated_.places.stand_from_board);
       const auto seen = look_at_board(simulated_.truth, simulated_.board, rig_from_board, 0.05, random_);
-      record.looks[i].board = *locate_board(seen, simulated_.board, simulated_.calibration);
+      record.views[i].board = *locate_board(seen, simulated_.board, simulated_.calibration);
     }
   }
 
   void reorder(const std::vector<std::size_t>& lines) {
-    const std::vector<RecordedLook> before = record.looks;
-    for (std::size_t i = 0; i < lines.size(); ++i) record.looks[i].pose = before[lines[i]].pose;
+    const std::vector<RecordedView> before = record.views;
+    for (std::size_t i = 0; i < lines.size(); ++i) record.views[i].pose = before[lines[i]].pose;
   }
 
   [[nodiscard]] const SimulatedSession& simulated() const { return simulated_; }
@@ -159,23 +159,23 @@ TEST(DiagnoseHandEye, NamesAWrongMounting) {
 
 TEST(DiagnoseHandEye, NamesShuffledPoses) {
   expect_named(Fault::kPoseOrder, [](Recorded& recorded) {
-    std::vector<std::size_t> lines(recorded.record.looks.size());
+    std::vector<std::size_t> lines(recorded.record.views.size());
     std::iota(lines.begin(), lines.end(), 0);
     std::shuffle(lines.begin(), lines.end(), std::mt19937(1));
     recorded.reorder(lines);
   });
 }
 
-TEST(DiagnoseHandEye, NamesPosesOneLookTooLate) {
+TEST(DiagnoseHandEye, NamesPosesOneViewTooLate) {
   expect_named(Fault::kPoseOrder, [](Recorded& recorded) {
-    const std::size_t count = recorded.record.looks.size();
+    const std::size_t count = recorded.record.views.size();
     const std::vector<double> somewhere = robot_numbers(
-        recorded.simulated().session.looks[0].base_from_flange.after({turned_by({0.3, 0.2, 0.1}), {50, 0, 80}}),
+        recorded.simulated().session.views[0].base_from_flange.after({turned_by({0.3, 0.2, 0.1}), {50, 0, 80}}),
         recorded.record.notation);
     std::vector<std::size_t> lines(count, 0);
     for (std::size_t i = 1; i < count; ++i) lines[i] = i - 1;
     recorded.reorder(lines);
-    recorded.record.looks[0].pose = somewhere;
+    recorded.record.views[0].pose = somewhere;
   });
 }
 
@@ -194,13 +194,13 @@ TEST(DiagnoseHandEye, NamesPosesReadOnTheWay) {
 
 TEST(DiagnoseHandEye, NamesACopiedPose) {
   expect_named(Fault::kCopied,
-               [](Recorded& recorded) { recorded.record.looks[5].pose = recorded.record.looks[4].pose; });
+               [](Recorded& recorded) { recorded.record.views[5].pose = recorded.record.views[4].pose; });
 }
 
 TEST(DiagnoseHandEye, NamesCopiesOfTwoPoses) {
   expect_named(Fault::kCopied, [](Recorded& recorded) {
-    for (std::size_t i = 2; i < recorded.record.looks.size(); ++i)
-      recorded.record.looks[i].pose = recorded.record.looks[i % 2].pose;
+    for (std::size_t i = 2; i < recorded.record.views.size(); ++i)
+      recorded.record.views[i].pose = recorded.record.views[i % 2].pose;
   });
 }
 
@@ -259,17 +259,17 @@ TEST(DiagnoseHandEye, NamesPosesOfAnotherArm) {
     SimulatedRobot other;
     other.mounted = recorded.record.mounted;
     const SimulatedSession simulated = simulate(other, 99);
-    recorded.rewrite([&](std::size_t i, const RigidTransform&) { return simulated.session.looks[i].base_from_flange; });
+    recorded.rewrite([&](std::size_t i, const RigidTransform&) { return simulated.session.views[i].base_from_flange; });
   });
 }
 
 TEST(DiagnoseHandEye, NamesTooFewPoses) {
-  expect_named(Fault::kTooFewPoses, [](Recorded& recorded) { recorded.record.looks.resize(2); });
+  expect_named(Fault::kTooFewPoses, [](Recorded& recorded) { recorded.record.views.resize(2); });
 }
 
 TEST(DiagnoseHandEye, RefusesANumberThatIsNotFinite) {
   Recorded recorded({}, 1);
-  recorded.record.looks[3].pose[1] = std::numeric_limits<double>::quiet_NaN();
+  recorded.record.views[3].pose[1] = std::numeric_limits<double>::quiet_NaN();
   const auto result = diagnose_hand_eye(recorded.record, kWorkingMm);
   ASSERT_FALSE(result);
   EXPECT_THAT(to_string(result.error()), HasSubstr("pose_03: has a number that is not finite"));

@@ -98,12 +98,12 @@ cv::Mat to_column(const Eigen::Vector3d& place) {
 /// OpenCV's result from the same poses and the same places of boards. In the cell it takes inverted poses.
 RigidTransform by_opencv(const HandEyeSession& session, cv::HandEyeCalibrationMethod method) {
   std::vector<cv::Mat> robot_turns, robot_places, board_turns, board_places;
-  for (const HandEyeLook& look : session.looks) {
+  for (const HandEyeView& view : session.views) {
     const RigidTransform robot =
-        session.mounted == Mounted::kArm ? look.base_from_flange : look.base_from_flange.inverse();
+        session.mounted == Mounted::kArm ? view.base_from_flange : view.base_from_flange.inverse();
     robot_turns.push_back(to_matrix(robot.rotation)), robot_places.push_back(to_column(robot.translation));
-    board_turns.push_back(to_matrix(look.board.rig_from_board.rotation));
-    board_places.push_back(to_column(look.board.rig_from_board.translation));
+    board_turns.push_back(to_matrix(view.board.rig_from_board.rotation));
+    board_places.push_back(to_column(view.board.rig_from_board.translation));
   }
   cv::Mat turn, place;
   cv::calibrateHandEye(robot_turns, robot_places, board_turns, board_places, turn, place, method);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kAtMm = 1000;
 
-/// Takes a look at the pose, as the simulated robot would.
+/// Takes a view at the pose, as the simulated robot would.
 void take(SimulatedSession& simulated, const RigidTransform& base_from_flange, std::mt19937& random) {
   const RigidTransform view = simulated.places.mount_from_rig.inverse()
                                   .after(mount_from_stand(simulated.session.mounted, base_from_flange))
@@ -22,7 +22,7 @@ void take(SimulatedSession& simulated, const RigidTransform& base_from_flange, s
   const auto seen = look_at_board(simulated.truth, simulated.board, view, 0.05, random);
   const auto located = locate_board(seen, simulated.board, simulated.calibration);
   ASSERT_TRUE(located) << to_string(located.error());
-  simulated.session.looks.push_back({"next", *located, base_from_flange});
+  simulated.session.views.push_back({"next", *located, base_from_flange});
 }
 
 TEST(ProposePose, AddsTheMotionThatIsMissing) {

@@ -85,7 +85,7 @@ void locate_all(SimulatedSession& simulated) {
   for (std::size_t i = 0; i < simulated.sightings.size(); ++i) {
     const auto located = locate_board(simulated.sightings[i], simulated.board, simulated.calibration);
     if (!located) std::abort();
-    simulated.session.looks[i].board = *located;
+    simulated.session.views[i].board = *located;
     boards.push_back(*located);
   }
   simulated.session.corner_px = corner_noise_px(boards);
@@ -121,11 +121,11 @@ SimulatedSession simulate(const SimulatedRobot& robot, std::uint32_t seed) {
     const RigidTransform base_from_flange = arm ? mount_from_stand.inverse() : mount_from_stand;
     simulated.base_from_flange.push_back(base_from_flange);
     simulated.sightings.push_back(look_at_board(simulated.truth, printed, rig_from_board, robot.corner_px, random));
-    HandEyeLook look;
-    look.name = "pose_" + std::to_string(100 + i).substr(1);
-    look.base_from_flange = {turned_by(robot.noise.turn_rad * draw.normal3()) * base_from_flange.rotation,
+    HandEyeView view;
+    view.name = "pose_" + std::to_string(100 + i).substr(1);
+    view.base_from_flange = {turned_by(robot.noise.turn_rad * draw.normal3()) * base_from_flange.rotation,
                              base_from_flange.translation + robot.noise.place_mm * draw.normal3()};
-    simulated.session.looks.push_back(look);
+    simulated.session.views.push_back(view);
   }
   locate_all(simulated);
   return simulated;

@@ -81,7 +81,7 @@ class FromFiles : public testing::Test {
     request_.from = home_ / "captures";
     std::filesystem::copy(captures_, request_.from, std::filesystem::copy_options::recursive);
   }
-  /// Poses and looks at the plane.
+  /// Poses and views of the plane.
   void copy_all() {
     copy_captures();
     std::filesystem::copy(planes_, request_.from, std::filesystem::copy_options::recursive);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 
-// Draws looks at a board: make_looks DIR COUNT makes DIR/pose_NN/white.png, calibration.yml with the board's name, and
+// Draws views of a board: make_looks DIR COUNT makes DIR/pose_NN/white.png, calibration.yml with the board's name, and
 // looks.csv with the 4x4 matrix camera_from_board (mm) of each, row by row. make_looks DIR COUNT 2 makes
 // DIR/pose_NN/camera/white.png and DIR/pose_NN/right/white.png, of two cameras; then looks.csv has rig_from_board.
 #include <cstdlib>

@@ -271,8 +271,8 @@ TEST_F(CalibrationSession, EndsAtOnceWhereTheDevicesDoNotBegin) {
   EXPECT_EQ(stage_->pictures(), 1);
 }
 
-// As at the first look at the reference plane, after the poses.
-TEST_F(CalibrationSession, OutlivesDevicesThatAreLostAtTheFirstLookAfterOtherPoses) {
+// As at the first view of the reference plane, after the poses.
+TEST_F(CalibrationSession, OutlivesDevicesThatAreLostAtTheFirstViewAfterOtherPoses) {
   begin();
   options_.begun = true;
   stage_->lost = [](const BoardStage& stage) { return stage.pictures() < 4; };

@@ -21,7 +21,7 @@ using testing::HasSubstr;
 
 constexpr double kTurnRad = 0.1 / 57.29578;
 
-/// One look at a board, by a rig whose projector turned by 0.1 degrees since it was calibrated.
+/// One view of a board, by a rig whose projector turned by 0.1 degrees since it was calibrated.
 class CorrectFromFiles : public testing::Test {
  protected:
   void SetUp() override {

@@ -17,7 +17,7 @@ namespace {
 using std::filesystem::path;
 using testing::HasSubstr;
 
-/// One look at a board, and a calibration that each test writes.
+/// One view of a board, and a calibration that each test writes.
 class VerifyFromFiles : public testing::Test {
  protected:
   void SetUp() override {

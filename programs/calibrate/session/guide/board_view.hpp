@@ -13,13 +13,13 @@ namespace slsd {
 using BoardSightings = std::vector<Result<BoardSighting>>;
 
 /// The views of all cameras at one moment, one entry for each camera.
-struct BoardLook {
+struct BoardView {
   std::vector<GreyImage> pictures;
   BoardSightings sightings;
 };
 
 /// @thread reentrant
-[[nodiscard]] BoardLook look_for_board(std::vector<GreyImage> pictures, const Board& board);
+[[nodiscard]] BoardView look_for_board(std::vector<GreyImage> pictures, const Board& board);
 
 /// Tells whether any camera sees the board.
 [[nodiscard]] bool is_seen(const BoardSightings& sightings);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/calibrate/session/guide/board_look.hpp"
+#include "programs/calibrate/session/guide/board_view.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -28,10 +28,10 @@ std::optional<double> moved_px(const BoardSighting& before, const BoardSighting&
 
 }  // namespace
 
-BoardLook look_for_board(std::vector<GreyImage> pictures, const Board& board) {
-  BoardLook look{std::move(pictures), {}};
-  for (const GreyImage& picture : look.pictures) look.sightings.push_back(find_board(view(picture), board));
-  return look;
+BoardView look_for_board(std::vector<GreyImage> pictures, const Board& board) {
+  BoardView seen{std::move(pictures), {}};
+  for (const GreyImage& picture : seen.pictures) seen.sightings.push_back(find_board(view(picture), board));
+  return seen;
 }
 
 bool is_seen(const BoardSightings& sightings) {

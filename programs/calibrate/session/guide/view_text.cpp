@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/calibrate/session/guide/look_text.hpp"
+#include "programs/calibrate/session/guide/view_text.hpp"
 
 #include <fmt/format.h>
 
 namespace slsd {
 
-std::string look_text(const BoardSightings& sightings, const std::vector<std::string>& cameras) {
+std::string view_text(const BoardSightings& sightings, const std::vector<std::string>& cameras) {
   std::string text;
   for (std::size_t i = 0; i < sightings.size(); ++i) {
     if (i > 0) text += "; ";

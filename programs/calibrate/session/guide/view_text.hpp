@@ -5,15 +5,15 @@
 #include <string>
 #include <vector>
 
-#include "programs/calibrate/session/guide/board_look.hpp"
+#include "programs/calibrate/session/guide/board_view.hpp"
 
 namespace slsd {
 
-/// A look as a line for the terminal. For each camera: "left: 60 corners, edges 0.6 px, clipped 0 %", or why it sees no
+/// A view as a line for the terminal. For each camera: "left: 60 corners, edges 0.6 px, clipped 0 %", or why it sees no
 /// board.
 /// @param cameras  their names
 /// @thread reentrant
-[[nodiscard]] std::string look_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
+[[nodiscard]] std::string view_text(const BoardSightings& sightings, const std::vector<std::string>& cameras);
 
 /// The reasons why cameras see no board, one line each, each after a line end.
 /// @thread reentrant

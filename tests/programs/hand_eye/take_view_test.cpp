@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/hand_eye/take_look.hpp"
+#include "programs/hand_eye/take_view.hpp"
 
 #include <cstdlib>
 #include <limits>
@@ -30,16 +30,16 @@ class StillSource final : public PoseSource {
   bool white_ = false;
 };
 
-class TakeLook : public testing::Test {
+class TakeView : public testing::Test {
  protected:
   void SetUp() override {
-    std::string name = testing::TempDir() + "slsd-look-XXXXXX";
+    std::string name = testing::TempDir() + "slsd-view-XXXXXX";
     if (mkdtemp(name.data()) == nullptr) std::abort();
     folder_ = std::filesystem::path(name) / "captures";
   }
   void TearDown() override { std::filesystem::remove_all(folder_.parent_path()); }
-  Result<TakenLook> take(const std::vector<double>& pose) {
-    return take_look(source_, folder_, pose, *pose_notation("kuka"));
+  Result<TakenView> take(const std::vector<double>& pose) {
+    return take_view(source_, folder_, pose, *pose_notation("kuka"));
   }
   [[nodiscard]] std::string lines() const { return read_file(folder_ / "poses.csv", 1 << 20).value_or("none"); }
 
@@ -47,7 +47,7 @@ class TakeLook : public testing::Test {
   StillSource source_;
 };
 
-TEST_F(TakeLook, AddsPictureAndPose) {
+TEST_F(TakeView, AddsPictureAndPose) {
   ASSERT_TRUE(take({1, 2, 3, 40, 50, 60.25}));
   const auto second = take({-1, 2, 3, 40, 50, 60});
   ASSERT_TRUE(second);
@@ -56,27 +56,27 @@ TEST_F(TakeLook, AddsPictureAndPose) {
   EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "pose_01/white.png"));
 }
 
-TEST_F(TakeLook, IsDroppedWithoutATrace) {
+TEST_F(TakeView, IsDroppedWithoutATrace) {
   const auto first = take({1, 2, 3, 40, 50, 60});
   ASSERT_TRUE(first);
   const std::string before = lines();
   const auto second = take({-1, 2, 3, 40, 50, 60});
   ASSERT_TRUE(second);
-  ASSERT_TRUE(drop_look(folder_, *second));
+  ASSERT_TRUE(drop_view(folder_, *second));
   EXPECT_EQ(lines(), before);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "pose_01"));
-  ASSERT_TRUE(drop_look(folder_, *first));
+  ASSERT_TRUE(drop_view(folder_, *first));
   EXPECT_TRUE(std::filesystem::is_empty(folder_));
 }
 
-TEST_F(TakeLook, OfSeveralCamerasHasAFolderForEach) {
+TEST_F(TakeView, OfSeveralCamerasHasAFolderForEach) {
   source_.names = {"left", "right eye"};
   ASSERT_TRUE(take({1, 2, 3, 40, 50, 60}));
   EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "pose_00/left/white.png"));
   EXPECT_TRUE(std::filesystem::is_regular_file(folder_ / "pose_00/right eye/white.png"));
 }
 
-TEST_F(TakeLook, RefusesACameraWhoseNameIsNoFolder) {
+TEST_F(TakeView, RefusesACameraWhoseNameIsNoFolder) {
   for (const char* name : {"../right", "a/b", "..", "."}) {
     source_.names = {"left", name};
     const auto wrong = take({1, 2, 3, 40, 50, 60});
@@ -89,7 +89,7 @@ TEST_F(TakeLook, RefusesACameraWhoseNameIsNoFolder) {
   EXPECT_TRUE(take({1, 2, 3, 40, 50, 60}));
 }
 
-TEST_F(TakeLook, ChangesNothingOnBadInput) {
+TEST_F(TakeView, ChangesNothingOnBadInput) {
   const auto wrong = take({1, 2, 3, 4, 5, std::numeric_limits<double>::quiet_NaN()});
   ASSERT_FALSE(wrong);
   EXPECT_THAT(to_string(wrong.error()), HasSubstr("--pose: has a number that is not finite"));
@@ -99,7 +99,7 @@ TEST_F(TakeLook, ChangesNothingOnBadInput) {
   EXPECT_FALSE(std::filesystem::exists(folder_));
 }
 
-TEST_F(TakeLook, KeepsAFileThatIsNoFileOfPoses) {
+TEST_F(TakeView, KeepsAFileThatIsNoFileOfPoses) {
   std::filesystem::create_directories(folder_);
   ASSERT_TRUE(write_file_atomically(folder_ / "poses.csv", "pose_00,1,2,x\n"));
   const auto refused = take({1, 2, 3, 4, 5, 6});

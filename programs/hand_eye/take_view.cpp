@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "programs/hand_eye/take_look.hpp"
+#include "programs/hand_eye/take_view.hpp"
 
 #include <system_error>
 
@@ -45,22 +45,22 @@ Result<> write_white(const path& folder, const GreyImage& picture) {
   return write_file_atomically(folder / "white.png", *png);
 }
 
-Result<> write_look(const path& folder, const TakenLook& look, const std::vector<std::string>& cameras,
+Result<> write_view(const path& folder, const TakenView& view, const std::vector<std::string>& cameras,
                     const std::vector<GreyImage>& pictures, std::span<const double> numbers) {
   for (std::size_t i = 0; i < pictures.size(); ++i) {
-    const path own = pictures.size() > 1 ? folder / look.name / cameras[i] : folder / look.name;
+    const path own = pictures.size() > 1 ? folder / view.name / cameras[i] : folder / view.name;
     if (auto written = write_white(own, pictures[i]); !written) return written;
   }
-  std::string lines = look.lines_before.value_or("");
+  std::string lines = view.lines_before.value_or("");
   if (!lines.empty() && !lines.ends_with('\n')) lines += '\n';
-  lines += look.name;
+  lines += view.name;
   for (const double number : numbers) lines += fmt::format(",{:.10g}", number);
   return write_file_atomically(folder / "poses.csv", lines + '\n');
 }
 
 }  // namespace
 
-Result<TakenLook> take_look(PoseSource& source, const path& folder, std::span<const double> numbers,
+Result<TakenView> take_view(PoseSource& source, const path& folder, std::span<const double> numbers,
                             const PoseNotation& notation) {
   if (const auto pose = read_robot_pose(numbers, notation); !pose)
     return fail(pose.error().code, pose.error().message, "--pose");
@@ -70,20 +70,20 @@ Result<TakenLook> take_look(PoseSource& source, const path& folder, std::span<co
   source.show(Grey8(source.projector().width_px, source.projector().height_px, 255));
   const auto pictures = source.grab();
   if (!pictures) return tl::unexpected(pictures.error());
-  TakenLook look{free_name_in(folder), std::move(*lines)};
-  if (auto written = write_look(folder, look, source.cameras(), *pictures, numbers); !written) {
-    (void)drop_look(folder, look);
+  TakenView view{free_name_in(folder), std::move(*lines)};
+  if (auto written = write_view(folder, view, source.cameras(), *pictures, numbers); !written) {
+    (void)drop_view(folder, view);
     return tl::unexpected(written.error());
   }
-  return look;
+  return view;
 }
 
-Result<> drop_look(const path& folder, const TakenLook& look) {
+Result<> drop_view(const path& folder, const TakenView& view) {
   std::error_code error;
-  std::filesystem::remove_all(folder / look.name, error);
-  if (!look.lines_before) std::filesystem::remove(folder / "poses.csv", error);
+  std::filesystem::remove_all(folder / view.name, error);
+  if (!view.lines_before) std::filesystem::remove(folder / "poses.csv", error);
   if (error) return fail(ErrorCode::kIo, error.message(), folder.string());
-  return look.lines_before ? write_file_atomically(folder / "poses.csv", *look.lines_before) : Result<>();
+  return view.lines_before ? write_file_atomically(folder / "poses.csv", *view.lines_before) : Result<>();
 }
 
 }  // namespace slsd
