@@ -36,10 +36,6 @@ struct BundleNotes {
 [[nodiscard]] Result<std::string> write_bundle(const std::vector<KeptScan>& scans, const BundleNotes& notes,
                                                std::chrono::system_clock::time_point now);
 
-/// All keys of [decode] and of [cloud] with the values in force, from any source.
-[[nodiscard]] nlohmann::json decode_keys(const DecodeOptions& options);
-[[nodiscard]] nlohmann::json cloud_keys(const CloudOptions& options);
-
 /// A frame of a bundle.
 struct BundledFrame {
   std::string camera;

@@ -11,6 +11,7 @@
 #include "core/shown_picture.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/bundle/bundle.hpp"
+#include "daemon/configuration/configuration.hpp"
 #include "daemon/server/methods/scan_json.hpp"
 #include "drivers/camera/frame_image.hpp"
 #include "drivers/files/encode_png.hpp"
@@ -146,36 +147,7 @@ class RecordingPart {
   std::uint64_t scans_ = 0, failed_ = 0, framed_ = 0;
 };
 
-std::string_view method_name(Method method) {
-  return method == Method::kPaper ? "paper" : "default";
-}
-
 }  // namespace
-
-json decode_keys(const DecodeOptions& options) {
-  return {{"depth_min_mm", options.depth_min_mm},
-          {"depth_max_mm", options.depth_max_mm},
-          {"wrong_cells_max", options.wrong_cells_max},
-          {"precision", options.precision == Precision::kFine ? "fine" : "standard"},
-          {"density", to_string(options.density)},
-          {"dense_stride_px", options.dense.stride_px},
-          {"dense_prune_px", options.dense.prune_px},
-          {"binarize", method_name(options.binarize)},
-          {"find_regions", method_name(options.find_regions)},
-          {"classify", method_name(options.classify)},
-          {"centre", method_name(options.centre)},
-          {"link_grid", method_name(options.link_grid)},
-          {"decode_windows", method_name(options.decode_windows)},
-          {"correspond", method_name(options.correspond)}};
-}
-
-json cloud_keys(const CloudOptions& options) {
-  return {{"box", options.box},
-          {"plane", options.plane},
-          {"box_frame", options.box_frame == CoordinateFrame::kRobotBase ? "robot_base" : "rig"},
-          {"voxel_mm", options.voxel_mm},
-          {"stride", options.stride}};
-}
 
 Result<std::string> write_bundle(const std::vector<KeptScan>& scans, const BundleNotes& notes,
                                  std::chrono::system_clock::time_point now) {

@@ -33,6 +33,24 @@ constexpr std::array kCoordinateFrames{std::pair("rig"sv, CoordinateFrame::kRig)
 constexpr std::array kOtherHardware{std::pair("error"sv, OtherHardware::kError),
                                     std::pair("warn"sv, OtherHardware::kWarn)};
 
+/// Takes the place of a TableReader and notes the values in force.
+class KeyWriter {
+ public:
+  template <class Value>
+  void read(const char* key, const Value& value) {
+    keys_[key] = value;
+  }
+  template <class Value, class Choices>
+  void choose(const char* key, const Value& value, const Choices& choices) {
+    for (const auto& [name, choice] : choices)
+      if (choice == value) keys_[key] = name;
+  }
+  [[nodiscard]] json keys() && { return std::move(keys_); }
+
+ private:
+  json keys_ = json::object();
+};
+
 void read_keys(TableReader& reader, ProjectorOptions& options) {
   reader.choose("driver", options.driver, kProjectorDrivers);
   reader.read("monitor", options.monitor);
@@ -59,7 +77,8 @@ void read_keys(TableReader& reader, PatternOptions& options) {
   reader.read("column_reach", options.column_reach);
 }
 
-void read_keys(TableReader& reader, DecodeOptions& options) {
+template <class Reader>
+void read_keys(Reader& reader, DecodeOptions& options) {
   reader.read("depth_min_mm", options.depth_min_mm);
   reader.read("depth_max_mm", options.depth_max_mm);
   reader.read("wrong_cells_max", options.wrong_cells_max);
@@ -81,7 +100,8 @@ void read_keys(TableReader& reader, FrameOptions& options) {
   reader.read("hand_eye", options.hand_eye);
 }
 
-void read_keys(TableReader& reader, CloudOptions& options) {
+template <class Reader>
+void read_keys(Reader& reader, CloudOptions& options) {
   reader.read("box", options.box);
   reader.read("plane", options.plane);
   reader.choose("box_frame", options.box_frame, kCoordinateFrames);
@@ -120,6 +140,13 @@ template <class Options>
 Result<> read_table(TableReader reader, Options& options) {
   read_keys(reader, options);
   return reader.finish(options.validate());
+}
+
+template <class Options>
+json keys_in_force(Options& options) {
+  KeyWriter writer;
+  read_keys(writer, options);
+  return std::move(writer).keys();
 }
 
 // A pattern file contains the whole pattern: another key beside it could only contradict it.
@@ -229,6 +256,14 @@ std::vector<std::string> known_keys() {
   add("server", [&](auto& reader) { read_keys(reader, ignored.server); });
   add("black_box", [&](auto& reader) { read_keys(reader, ignored.black_box); });
   return keys;
+}
+
+json decode_keys(DecodeOptions options) {
+  return keys_in_force(options);
+}
+
+json cloud_keys(CloudOptions options) {
+  return keys_in_force(options);
 }
 
 Result<Configuration> load_configuration(const path& file) {

@@ -55,6 +55,11 @@ struct Configuration {
 /// The keys that read_configuration() knows: "projector.width_px", and of cameras by driver: "camera.v4l2.device".
 [[nodiscard]] std::vector<std::string> known_keys();
 
+/// All keys of [decode] and of [cloud] with the values in force, from any source: read_configuration() reads them
+/// again.
+[[nodiscard]] nlohmann::json decode_keys(DecodeOptions options);
+[[nodiscard]] nlohmann::json cloud_keys(CloudOptions options);
+
 /// Reads a configuration file. @errors as above, and those of read_file() @thread reentrant
 [[nodiscard]] Result<Configuration> load_configuration(const std::filesystem::path& file);
 

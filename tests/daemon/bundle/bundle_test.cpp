@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/bundle/bundle_store.hpp"
+#include "daemon/configuration/configuration.hpp"
 #include "drivers/recording/layout.hpp"
 #include "tests/daemon/configuration/read_text.hpp"
 #include "tests/drivers/temporary_folder.hpp"
