@@ -12,6 +12,10 @@ namespace slsd {
 inline constexpr std::array kDurationBounds{0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05,
                                             0.1,    0.2,   0.5,   1.0,   2.0,  5.0};
 
+[[nodiscard]] inline double in_ms(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
 /// The times that one activity took: the last, the mean, the maximum, and a histogram.
 struct Duration {
   std::chrono::nanoseconds last{};

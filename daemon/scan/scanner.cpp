@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/duration.hpp"
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/rig/devices.hpp"
@@ -38,10 +39,6 @@ std::string make_run_id() {
   char text[9];
   std::snprintf(text, sizeof text, "%08x", source());
   return text;
-}
-
-double milliseconds(std::chrono::nanoseconds time) {
-  return std::chrono::duration<double, std::milli>(time).count();
 }
 
 Error stopping() {
@@ -421,7 +418,7 @@ void Scanner::conclude(const Scan& scan, Result<ScanResult>& result) {
 void Scanner::log_outcome(const std::string& scan_id, const Result<ScanResult>& result) {
   if (result) {
     spdlog::debug("scan {}: {} points, capture {:.1f} ms, decode {:.1f} ms, {} lost tries", scan_id,
-                  result->cloud.points.size(), milliseconds(result->capture_time), milliseconds(result->decode_time),
+                  result->cloud.points.size(), in_ms(result->capture_time), in_ms(result->decode_time),
                   result->lost.count);
     if (result->empty.empty()) {
       empty_reported_ = false;

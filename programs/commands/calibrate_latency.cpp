@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "core/duration.hpp"
 #include "core/utc_text.hpp"
 #include "daemon/configuration/configuration.hpp"
 #include "daemon/scan/rig/devices.hpp"
@@ -20,16 +21,12 @@ using std::filesystem::path;
 
 constexpr auto kOpenTime = std::chrono::seconds(30);
 
-double milliseconds(std::chrono::microseconds time) {
-  return std::chrono::duration<double, std::milli>(time).count();
-}
-
 void print(const CameraLatency& camera) {
   std::cout << fmt::format(
                    "camera \"{}\": first complete frame {:.1f} ms after the image was shown (5 to 95 % of {} flashes: "
                    "{:.1f} to {:.1f} ms); every frame that began {:.1f} ms later was complete\n",
-                   camera.camera, milliseconds(camera.median), camera.flashes, milliseconds(camera.p05),
-                   milliseconds(camera.p95), milliseconds(camera.latency))
+                   camera.camera, in_ms(camera.median), camera.flashes, in_ms(camera.p05), in_ms(camera.p95),
+                   in_ms(camera.latency))
             << std::flush;
 }
 

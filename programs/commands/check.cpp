@@ -16,6 +16,7 @@
 #include "core/decode/symbols/symbol_warnings.hpp"
 #include "core/dense/dense_mapper.hpp"
 #include "core/dense/dense_outlook.hpp"
+#include "core/duration.hpp"
 #include "core/exposure/exposure_advice.hpp"
 #include "core/exposure/light_levels.hpp"
 #include "core/exposure/merge_exposures.hpp"
@@ -400,8 +401,7 @@ class Check {
           "a still scene. Memory: {:.0f} MB, at most {:.0f} MB shared by all decoders, and {:.0f} MB per cloud in "
           "progress",
           name, outlook.depth_mm, outlook.thinnest_part_mm, outlook.half_transfer_mm, outlook.mm_per_px, points, pixels,
-          std::chrono::duration<double, std::milli>(least).count(),
-          std::chrono::duration<double, std::milli>(still).count(), static_cast<double>(mapper.bytes()) / kMega,
+          in_ms(least), in_ms(still), static_cast<double>(mapper.bytes()) / kMega,
           static_cast<double>(DenseMapper::bytes_of_fields(setup.calibration->projector)) / kMega,
           static_cast<double>(pixels * kCloudBytesAPixel) / kMega));
     }

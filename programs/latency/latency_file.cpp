@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "core/duration.hpp"
 #include "core/toml/table_reader.hpp"
 
 namespace slsd {
@@ -94,7 +95,7 @@ std::vector<std::string> latency_warnings(const Configuration& configuration, co
           fmt::format("camera \"{}\": its latency was measured on overexposed frames, and may be one exposure too "
                       "short: expose less, then run slsd --calibrate --latency",
                       camera.name()));
-    const double needed_ms = std::chrono::duration<double, std::milli>(measured->latency).count();
+    const double needed_ms = in_ms(measured->latency);
     if (needed_ms <= configuration.scan.projector_latency_ms) continue;
     warnings.push_back(
         fmt::format("camera \"{}\" saw complete images only {:.1f} ms after they were shown, but [scan] "

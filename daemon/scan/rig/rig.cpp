@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <utility>
 
+#include "core/duration.hpp"
+
 namespace slsd {
 namespace {
 
@@ -20,7 +22,7 @@ constexpr auto kHangUpTime = 1s;  // if nobody waits for the frame any more
 
 std::string milliseconds_text(std::chrono::nanoseconds time) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.3f ms", std::chrono::duration<double, std::milli>(time).count());
+  std::snprintf(text, sizeof text, "%.3f ms", in_ms(time));
   return text;
 }
 

@@ -2,7 +2,6 @@
 // Copyright the slsd authors
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <string>
 
@@ -11,10 +10,6 @@
 #include "daemon/scan/cloud/scan_result.hpp"
 
 namespace slsd {
-
-[[nodiscard]] inline double milliseconds(std::chrono::nanoseconds time) {
-  return std::chrono::duration<double, std::milli>(time).count();
-}
 
 /// The counts of regions by status.
 template <class Counts>

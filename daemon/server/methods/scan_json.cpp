@@ -7,6 +7,7 @@
 #include <functional>
 #include <vector>
 
+#include "core/duration.hpp"
 #include "core/geometry/robot_pose.hpp"
 #include "daemon/server/methods/counts_json.hpp"
 #include "rpc/message.hpp"
@@ -25,7 +26,7 @@ void add_pixels(const DenseCloud& dense, const ScanResult& scan, json& result) {
   result["width_px"] = dense.views.front().map.width;
   result["height_px"] = dense.views.front().map.height;
   result["points"] = dense.points();
-  result["dense_ms"] = milliseconds(scan.dense_time);
+  result["dense_ms"] = in_ms(scan.dense_time);
   if (scan.dense_saturated) result["saturated"] = *scan.dense_saturated;
   if (scan.dense_unseen) result["unseen"] = *scan.dense_unseen;
   json pixels = json::object();
@@ -79,12 +80,12 @@ json matrix_json(const RigidTransform& transform) {
 }  // namespace
 
 double latency_ms(MonotonicTime received) {
-  return milliseconds(std::chrono::steady_clock::now() - received);
+  return in_ms(std::chrono::steady_clock::now() - received);
 }
 
 json scan_json(const ScanResult& scan, Density density) {
   json stages = json::object();
-  for (std::size_t i = 0; i < scan.stage_times.size(); ++i) stages[stage_name(i)] = milliseconds(scan.stage_times[i]);
+  for (std::size_t i = 0; i < scan.stage_times.size(); ++i) stages[stage_name(i)] = in_ms(scan.stage_times[i]);
   json result{{"scan", scan.cloud.scan_id},
               {"time", scan.cloud.time},
               {"time_ns", std::chrono::nanoseconds(scan.exposed.time_since_epoch()).count()},
@@ -95,9 +96,9 @@ json scan_json(const ScanResult& scan, Density density) {
               {"received_monotonic_us",
                std::chrono::duration_cast<std::chrono::microseconds>(scan.received.time_since_epoch()).count()},
               {"skipped", scan.skipped},
-              {"skew_ms", milliseconds(scan.skew)},
-              {"capture_ms", milliseconds(scan.capture_time)},
-              {"decode_ms", milliseconds(scan.decode_time)},
+              {"skew_ms", in_ms(scan.skew)},
+              {"capture_ms", in_ms(scan.capture_time)},
+              {"decode_ms", in_ms(scan.decode_time)},
               {"stages_ms", std::move(stages)}};
   if (scan.cloud.sigma_calibration_mm) result["sigma_calibration_mm"] = *scan.cloud.sigma_calibration_mm;
   if (scan.saturated) result["saturated"] = *scan.saturated;

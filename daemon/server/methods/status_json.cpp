@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <fstream>
 
+#include "core/duration.hpp"
 #include "core/printable.hpp"
 #include "daemon/scan/scan_statistics.hpp"
 #include "daemon/server/methods/counts_json.hpp"
@@ -18,9 +19,7 @@ namespace {
 using nlohmann::json;
 
 json duration_json(const Duration& duration) {
-  return {{"last", milliseconds(duration.last)},
-          {"mean", milliseconds(duration.mean())},
-          {"longest", milliseconds(duration.longest)}};
+  return {{"last", in_ms(duration.last)}, {"mean", in_ms(duration.mean())}, {"longest", in_ms(duration.longest)}};
 }
 
 json totals_json(const ScanTotals& totals) {
