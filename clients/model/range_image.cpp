@@ -53,10 +53,17 @@ Result<std::vector<Placed>> place(std::span<const DensePoint> points, std::size_
   return placed;
 }
 
-RangeImage crop(const std::vector<Placed>& placed, std::size_t number, const CalibratedCamera& camera) {
-  RangeImage image{
-      number, camera.lens, camera.rig_from_camera.inverse(), camera.lens.width_px, camera.lens.height_px, 0, 0, {}, {},
-      {},     {}};
+RangeImage crop(const std::vector<Placed>& placed, std::size_t number, const Calibration& calibration,
+                const std::optional<Box>& box) {
+  const CalibratedCamera& camera = calibration.cameras[number];
+  RangeImage image;
+  image.camera = number;
+  image.lens = camera.lens;
+  image.camera_from_rig = camera.rig_from_camera.inverse();
+  image.projector = calibration.projector;
+  image.projector_from_rig = camera.projector_from_camera.after(image.camera_from_rig);
+  image.box = box;
+  image.left = camera.lens.width_px, image.top = camera.lens.height_px;
   int right = 0, bottom = 0;
   for (const Placed& each : placed) {
     image.left = std::min(image.left, each.u), image.top = std::min(image.top, each.v);
@@ -113,7 +120,7 @@ Result<std::vector<RangeImage>> range_images(std::span<const DensePoint> points,
   for (std::size_t camera = 0; camera < calibration.cameras.size(); ++camera) {
     const auto placed = place(points, camera, calibration.cameras[camera], box);
     if (!placed) return tl::unexpected(placed.error());
-    if (!placed->empty()) images.push_back(crop(*placed, camera, calibration.cameras[camera]));
+    if (!placed->empty()) images.push_back(crop(*placed, camera, calibration, box));
   }
   return images;
 }

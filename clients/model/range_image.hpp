@@ -18,11 +18,16 @@
 
 namespace slsd::model {
 
+using Box = Eigen::AlignedBox3f;
+
 /// Measurement of one camera in one frame, cropped to the measured pixels.
 struct RangeImage {
   std::size_t camera = 0;  ///< in the calibration's order
   Lens lens;
   RigidTransform camera_from_rig;
+  Lens projector;  ///< whose light ends where its image ends
+  RigidTransform projector_from_rig;
+  std::optional<Box> box;                        ///< in the rig's frame, mm; points outside were left out
   int left = 0, top = 0, width = 0, height = 0;  ///< the crop, px of the camera
   std::vector<float> depth_mm;                   ///< along the camera's z axis, row by row; NaN where not measured
   std::vector<float> sigma_mm;                   ///< along the ray
@@ -51,8 +56,6 @@ struct RangeImage {
   for (int i = 0; i < 3; ++i) colour[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(std::lround(mean[i]));
   return colour;
 }
-
-using Box = Eigen::AlignedBox3f;
 
 /// Puts the points of a dense cloud back into their pixels: a point lies on the ray through its pixel's centre.
 /// @param box  in the rig's frame, mm; points outside are left out; nothing: all are taken

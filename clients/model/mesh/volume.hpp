@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "clients/model/places/surface_cells.hpp"
+#include "clients/model/places/shot.hpp"
 #include "core/mesh/mesh.hpp"
 
 namespace slsd::model {

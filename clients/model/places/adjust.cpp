@@ -17,72 +17,31 @@
 namespace slsd::model {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
-
 /// Frames whose orientations differ by more see too little of the same surface, from too different sides.
 constexpr double kLinkDegrees = 40;
 /// A link between frames this far apart in the path closes it.
 constexpr std::size_t kFarApart = 8;
 constexpr double kFewestLinkOverlap = 0.3;
 constexpr std::size_t kFewestLinkPairs = 100;
-constexpr double kLinkSigmas = 3;
 constexpr float kLinkGateMm = 3;
 
 struct Link {
   std::size_t a, b;
 };
 
-/// The distances between two shots' surfaces, as a quadratic form of how their places change against each other: a turn
-/// about the object's middle, scaled by its size, and a shift.
-struct LinkSums {
-  Matrix6 information = Matrix6::Zero();
-  Vector6 gradient = Vector6::Zero();
-  std::vector<float> over_sigma;
-  std::vector<float> off_mm;
-  std::size_t seen = 0;
-};
-
-struct Scale {
-  Eigen::Vector3d middle_mm;
-  double size_mm;
-};
-
-void add_pairs(LinkSums& sums, const ModelFrame& shot, const ModelFrame& reference, const Scale& scale,
-               double motion_mm, float gate_mm) {
-  const RigidTransform reference_from_shot = reference.object_from_rig.inverse().after(shot.object_from_rig);
-  visit_pairs(shot.shot, reference_from_shot, reference.shot, kCellSteps.size() - 1, gate_mm,
-              [&](const SurfaceCell& cell, const SurfaceCell* other, const Eigen::Vector3f& place) {
-                ++sums.seen;
-                if (!other) return;
-                const double off_mm = other->normal.dot(place - other->place_mm);
-                const Eigen::Vector3d normal = reference.object_from_rig.rotation * other->normal.cast<double>();
-                const Eigen::Vector3d arm = reference.object_from_rig * place.cast<double>() - scale.middle_mm;
-                const double sigma2 = cell.sigma_mm * cell.sigma_mm + other->sigma_mm * other->sigma_mm;
-                Vector6 row;
-                row << arm.cross(normal) / scale.size_mm, normal;
-                const double weight = robust_weight(off_mm, kLinkSigmas * std::sqrt(sigma2) + motion_mm) / sigma2;
-                sums.information.noalias() += weight * row * row.transpose();
-                sums.gradient += weight * off_mm * row;
-                sums.over_sigma.push_back(static_cast<float>(std::abs(off_mm) / std::sqrt(sigma2)));
-                sums.off_mm.push_back(static_cast<float>(off_mm));
-              });
-}
-
 /// Both ways, so that neither shot's cells count for more.
-LinkSums sums_of(std::span<const ModelFrame> frames, const Link& link, const Scale& scale, double motion_mm,
+PairSums sums_of(std::span<const ModelFrame> frames, const Link& link, const MotionScale& scale, double motion_mm,
                  float gate_mm = kLinkGateMm) {
-  LinkSums there, back;
-  add_pairs(there, frames[link.a], frames[link.b], scale, motion_mm, gate_mm);
-  add_pairs(back, frames[link.b], frames[link.a], scale, motion_mm, gate_mm);
-  there.information += back.information;
-  there.gradient -= back.gradient;
-  there.over_sigma.insert(there.over_sigma.end(), back.over_sigma.begin(), back.over_sigma.end());
-  there.seen += back.seen;
+  const PlacedShot a = frames[link.a].placed(), b = frames[link.b].placed();
+  const Pairing pairing{.gate_mm = gate_mm, .motion_mm = motion_mm};
+  PairSums there, back;
+  add_pairs(there, a, b, pairing, scale);
+  add_pairs(back, b, a, pairing, scale);
+  there.add_opposite(back);
   return there;
 }
 
-Scale scale_of(std::span<const ModelFrame> frames) {
+MotionScale scale_of(std::span<const ModelFrame> frames) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const ModelFrame& frame : frames) sum += frame.object_from_rig * frame.shot.middle_mm();
   const Eigen::Vector3d middle = sum / static_cast<double>(frames.size());
@@ -92,13 +51,13 @@ Scale scale_of(std::span<const ModelFrame> frames) {
   return {middle, std::max(10.0, std::sqrt(squares / static_cast<double>(frames.size())))};
 }
 
-std::vector<Link> links_of(std::span<const ModelFrame> frames, const Scale& scale) {
+std::vector<Link> links_of(std::span<const ModelFrame> frames, const MotionScale& scale) {
   std::vector<Link> links;
   for (std::size_t b = 1; b < frames.size(); ++b) {
     for (std::size_t a = 0; a < b; ++a) {
       if (turn_degrees(frames[a].object_from_rig, frames[b].object_from_rig) > kLinkDegrees) continue;
-      const LinkSums sums = sums_of(frames, {a, b}, scale, 0, 2 * kLinkGateMm);
-      const std::size_t pairs = sums.over_sigma.size();
+      const PairSums sums = sums_of(frames, {a, b}, scale, 0, 2 * kLinkGateMm);
+      const std::size_t pairs = sums.pairs();
       if (pairs >= kFewestLinkPairs && static_cast<double>(pairs) > kFewestLinkOverlap * static_cast<double>(sums.seen))
         links.push_back({a, b});
     }
@@ -111,7 +70,7 @@ struct LinkResidual {
   Matrix6 root;
   Vector6 offset;
 
-  explicit LinkResidual(const LinkSums& sums) {
+  explicit LinkResidual(const PairSums& sums) {
     const Eigen::SelfAdjointEigenSolver<Matrix6> solver(sums.information);
     const Vector6 values = solver.eigenvalues().cwiseMax(1e-9 * solver.eigenvalues()[5]);
     root = values.cwiseSqrt().asDiagonal() * solver.eigenvectors().transpose();
@@ -127,7 +86,8 @@ struct LinkResidual {
 };
 
 /// Solves for all changes at once. @return the greatest change
-double move_all(std::span<ModelFrame> frames, const std::vector<Link>& links, const Scale& scale, double motion_mm) {
+double move_all(std::span<ModelFrame> frames, const std::vector<Link>& links, const MotionScale& scale,
+                double motion_mm) {
   std::vector<Vector6> changes(frames.size(), Vector6::Zero());
   ceres::Problem problem;
   for (Vector6& change : changes) problem.AddParameterBlock(change.data(), 6);
@@ -144,13 +104,8 @@ double move_all(std::span<ModelFrame> frames, const std::vector<Link>& links, co
   ceres::Solve(options, &problem, &summary);
   double greatest = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    const Eigen::Vector3d turn = changes[i].head<3>() / scale.size_mm;
-    const double angle = turn.norm();
-    const Eigen::Matrix3d rotation =
-        angle > 0 ? Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix() : Eigen::Matrix3d::Identity();
     RigidTransform& pose = frames[i].object_from_rig;
-    pose = {rotation * pose.rotation,
-            rotation * (pose.translation - scale.middle_mm) + scale.middle_mm + changes[i].tail<3>()};
+    pose = moved(pose, changes[i], scale);
     greatest = std::max(greatest, changes[i].norm());
   }
   return greatest;
@@ -160,7 +115,7 @@ double move_all(std::span<ModelFrame> frames, const std::vector<Link>& links, co
 double apart_mm(std::span<const ModelFrame> frames, const std::vector<Link>& closing) {
   std::vector<double> moves;
   for (const Link& link : closing) {
-    const PlacedShot reference{&frames[link.a].shot, frames[link.a].object_from_rig};
+    const PlacedShot reference = frames[link.a].placed();
     const ModelFrame& moved = frames[link.b];
     const auto found = align(moved.shot, {&reference, 1}, moved.object_from_rig);
     if (!found || !refusal_of(*found).empty()) continue;
@@ -187,7 +142,7 @@ bool came_round(std::span<const ModelFrame> frames, std::size_t early, std::size
 Adjustment adjust(std::span<ModelFrame> frames) {
   Adjustment done;
   if (frames.empty()) return done;
-  const Scale scale = scale_of(frames);
+  const MotionScale scale = scale_of(frames);
   std::vector<Link> links = links_of(frames, scale);
   std::vector<Link> closing;
   for (const Link& link : links)
@@ -200,7 +155,7 @@ Adjustment adjust(std::span<ModelFrame> frames) {
   std::vector<std::vector<float>> by_frame(frames.size());
   std::vector<float> all;
   for (const Link& link : links) {
-    const LinkSums sums = sums_of(frames, link, scale, 0);
+    const PairSums sums = sums_of(frames, link, scale, 0);
     for (auto* to : {&all, &by_frame[link.a], &by_frame[link.b]})
       to->insert(to->end(), sums.over_sigma.begin(), sums.over_sigma.end());
   }

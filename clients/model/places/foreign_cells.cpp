@@ -108,16 +108,6 @@ bool is_doubtful(const CellEvidence& evidence) {
   return outweighs(evidence.through + evidence.silent, kAgainstShare, evidence);
 }
 
-/// Calls visit(index) for the cells around one.
-template <class Visit>
-void visit_around(const CellGrid& grid, std::size_t cell, int radius, Visit&& visit) {
-  const int column = static_cast<int>(cell % static_cast<std::size_t>(grid.width)),
-            row = static_cast<int>(cell / static_cast<std::size_t>(grid.width));
-  for (int y = std::max(0, row - radius); y <= std::min(grid.height - 1, row + radius); ++y)
-    for (int x = std::max(0, column - radius); x <= std::min(grid.width - 1, column + radius); ++x)
-      visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(x));
-}
-
 /// The connected groups of doubtful cells that have enough empty ones among them.
 std::vector<bool> foreign_of(const CellGrid& grid, const std::vector<CellEvidence>& evidence) {
   std::vector<bool> foreign(grid.cells.size()), visited(grid.cells.size());
@@ -128,7 +118,7 @@ std::vector<bool> foreign_of(const CellGrid& grid, const std::vector<CellEvidenc
     std::size_t empty = 0;
     for (std::size_t next = 0; next < group.size(); ++next) {
       if (is_empty(evidence[group[next]])) ++empty;
-      visit_around(grid, group[next], 1, [&](std::size_t beside) {
+      visit_cells_around(grid, group[next], 1, [&](std::size_t beside) {
         if (visited[beside] || !(grid.cells[beside].sigma_mm > 0)) return;
         if (!is_empty(evidence[beside]) && !is_doubtful(evidence[beside])) return;
         visited[beside] = true;
@@ -187,6 +177,21 @@ void weigh(ShotEvidence& evidence, const PlacedShot& shot, const PlacedShot& wit
   }
 }
 
+MissingShares missing_shares(const PlacedShot& shot, const PlacedShot& witness) {
+  ShotEvidence evidence = no_evidence(*shot.shot);
+  weigh(evidence, shot, witness);
+  std::size_t all = 0, through = 0, silent = 0;
+  for (std::size_t i = 0; i < evidence.size(); ++i) {
+    const std::vector<SurfaceCell>& cells = shot.shot->views[i].levels.back().cells;
+    for (std::size_t j = 0; j < cells.size(); ++j) {
+      if (!(cells[j].sigma_mm > 0) || cells[j].foreign) continue;
+      ++all, through += evidence[i][j].through, silent += evidence[i][j].silent;
+    }
+  }
+  const double cells = static_cast<double>(std::max<std::size_t>(1, all));
+  return {static_cast<double>(through) / cells, static_cast<double>(silent) / cells};
+}
+
 void mark_coarse_cells(Shot& shot) {
   for (SurfaceView& view : shot.views)
     for (std::size_t level = 0; level + 1 < view.levels.size(); ++level)
@@ -229,7 +234,7 @@ std::vector<std::vector<std::size_t>> grown_foreign(const PlacedShot& shot, std:
     for (std::size_t cell = 0; cell < grid.cells.size(); ++cell)
       if (grid.cells[cell].foreign) group.push_back(cell), visited[cell] = true;
     for (std::size_t next = 0; next < group.size(); ++next) {
-      visit_around(grid, group[next], kNear, [&](std::size_t beside) {
+      visit_cells_around(grid, group[next], kNear, [&](std::size_t beside) {
         if (visited[beside] || !(grid.cells[beside].sigma_mm > 0) || evidence[i][beside].agree >= kConfirmed) return;
         visited[beside] = true;
         group.push_back(beside);
@@ -248,7 +253,7 @@ void drop_foreign(std::vector<RangeImage>& images, const Shot& shot) {
       if (!grid.cells[cell].foreign) continue;
       dropped[cell] = true;
       // Cells without a plane at the edge of what is dropped belong to it.
-      visit_around(grid, cell, 1, [&](std::size_t beside) {
+      visit_cells_around(grid, cell, 1, [&](std::size_t beside) {
         if (!(grid.cells[beside].sigma_mm > 0)) dropped[beside] = true;
       });
     }

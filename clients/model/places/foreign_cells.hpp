@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "clients/model/places/align.hpp"
-#include "clients/model/places/surface_cells.hpp"
+#include "clients/model/places/shot.hpp"
 #include "core/geometry/calibration.hpp"
 
 namespace slsd::model {
@@ -29,6 +29,15 @@ using ShotEvidence = std::vector<std::vector<CellEvidence>>;
 
 /// Adds what a witness says. @thread reentrant
 void weigh(ShotEvidence& evidence, const PlacedShot& shot, const PlacedShot& witness);
+
+/// Shares of an object's cells in one shot that another should see in their place and does not.
+struct MissingShares {
+  double through = 0;  ///< it saw what is behind them
+  double silent = 0;   ///< it saw nothing there
+};
+
+/// Both are close to 0 if the places are right. @thread reentrant
+[[nodiscard]] MissingShares missing_shares(const PlacedShot& shot, const PlacedShot& witness);
 
 /// Marks the cells that do not move with the object, such as those of a hand: their places are empty in other shots.
 /// Silence alone marks none, as dark and shaded surfaces are silent, too. It decides beside cells that light passed.

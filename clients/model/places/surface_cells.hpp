@@ -2,7 +2,9 @@
 // Copyright the slsd authors
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
@@ -36,25 +38,23 @@ struct CellGrid {
   }
 };
 
+/// Calls visit(index) for the cells around one. @param column, row  may lie outside
+template <class Visit>
+void visit_cells_around(const CellGrid& grid, int column, int row, int radius, Visit&& visit) {
+  for (int y = std::max(0, row - radius); y <= std::min(grid.height - 1, row + radius); ++y)
+    for (int x = std::max(0, column - radius); x <= std::min(grid.width - 1, column + radius); ++x)
+      visit(static_cast<std::size_t>(y) * static_cast<std::size_t>(grid.width) + static_cast<std::size_t>(x));
+}
+template <class Visit>
+void visit_cells_around(const CellGrid& grid, std::size_t cell, int radius, Visit&& visit) {
+  const auto width = static_cast<std::size_t>(grid.width);
+  visit_cells_around(grid, static_cast<int>(cell % width), static_cast<int>(cell / width), radius, visit);
+}
+
 /// Steps from coarse to fine, as align() uses them.
 inline constexpr std::array kCellSteps{16, 8, 4};
 
-/// A camera's range image with its cells.
-struct SurfaceView {
-  RangeImage image;
-  std::array<CellGrid, kCellSteps.size()> levels;
-  std::vector<Rgb> colours;  ///< means of the cells of the finest level; empty: the cloud has none
-};
-
-/// All that one frame measured.
-struct Shot {
-  std::vector<SurfaceView> views;  ///< one for each camera
-
-  [[nodiscard]] std::size_t cells() const;  ///< how many were measured at the finest level
-  [[nodiscard]] Eigen::Vector3d middle_mm() const;
-};
-
-/// @thread reentrant
-[[nodiscard]] Shot make_shot(std::vector<RangeImage> images);
+/// Planes fitted to the squares of each step, coarse ones first. @thread reentrant
+[[nodiscard]] std::array<CellGrid, kCellSteps.size()> fit_cells(const RangeImage& image);
 
 }  // namespace slsd::model

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,8 @@ struct ModelFrame {
   std::size_t number = 0;  ///< as given to add()
   Shot shot;               ///< without its pixels
   RigidTransform object_from_rig;
+
+  [[nodiscard]] PlacedShot placed() const { return {&shot, object_from_rig}; }
 };
 
 /// Follows a rigid object from frame to frame. The object's frame is the rig's at the first frame.
@@ -33,8 +36,9 @@ class Tracker {
   /// @param step_degrees  known turn from one frame to the next, about any axis of the rig; 0: unknown
   explicit Tracker(double step_degrees = 0) : step_degrees_(step_degrees) {}
 
-  /// Places a frame by the latest keyframes, from the last motion on. If that fails, tries all keyframes. Refuses a
-  /// frame in which two bodies moved differently since the one before.
+  /// Places a frame by the latest keyframes, from the last motion on. If that fails, tries all keyframes: what they
+  /// saw must be there, and if nothing led to the place, no part of a flat shot is taken for another. Refuses a frame
+  /// in which two bodies moved differently since the one before.
   /// @param number  of the frame, for ModelFrame; greater than the one before
   [[nodiscard]] Tracked add(std::size_t number, Shot shot);
 
@@ -46,9 +50,12 @@ class Tracker {
 
  private:
   [[nodiscard]] Tracked begin(const Shot& shot) const;
-  [[nodiscard]] Tracked follow(const Shot& shot);
+  [[nodiscard]] Tracked follow(std::size_t number, const Shot& shot);
   [[nodiscard]] bool is_of_two(const Shot& shot, const RigidTransform& object_from_rig, bool refused) const;
-  [[nodiscard]] std::optional<Alignment> search(const Shot& shot) const;
+  [[nodiscard]] std::optional<Alignment> search(std::size_t number, const Shot& shot) const;
+  [[nodiscard]] bool is_found(const PlacedShot& placed, std::size_t number,
+                              std::span<const PlacedShot> references) const;
+  [[nodiscard]] bool is_expected(std::size_t number, const RigidTransform& object_from_rig) const;
   [[nodiscard]] std::vector<PlacedShot> latest_keyframes() const;
   void add_keyframe();
   [[nodiscard]] RigidTransform expected() const;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/model/places/foreign_cells.hpp"
+#include "clients/model/places/visit_pairs.hpp"
 #include "core/geometry/robust.hpp"
 
 namespace slsd::model {

@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "clients/model/places/surface_cells.hpp"
+#include "clients/model/places/shot.hpp"
 #include "core/geometry/calibration.hpp"
 #include "core/mesh/mesh.hpp"
 

@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "clients/model/places/surface_cells.hpp"
+#include "clients/model/places/shot.hpp"
 #include "clients/model/range_image.hpp"
 
 namespace slsd::model {
@@ -41,7 +41,9 @@ inline Calibration test_calibration() {
   CalibratedCamera camera;
   camera.name = "camera";
   camera.lens = {.width_px = 400, .height_px = 320, .fx = 1800, .fy = 1800, .cx = 199.5, .cy = 159.5};
+  camera.projector_from_camera.translation = {-100, 0, 0};
   calibration.cameras.push_back(camera);
+  calibration.projector = {.width_px = 800, .height_px = 500, .fx = 1500, .fy = 1500, .cx = 650, .cy = 250};
   return calibration;
 }
 
