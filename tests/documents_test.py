@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
 """The blocks of PAGES that need no installation run as they are written; the others are sound shell. `./run newcomer` runs
-them all but those of docs/protocol.md. Every file and function that docs/architecture.md names is there."""
+them all. Every file and function that docs/architecture.md names is there."""
 import os
 import pathlib
 import re
@@ -17,7 +17,7 @@ BIN = pathlib.Path(os.environ["SLSD_BIN"])
 sys.path.append(str(SOURCE / "tests/machine"))
 from blocks import blocks_of, fits, session_of
 
-PAGES = ("README.md", "docs/installing.md", "docs/developing.md", "docs/protocol.md")
+PAGES = ("README.md", "docs/protocol.md", "docs/installing.md", "docs/configuration.md", "docs/developing.md")
 BLOCKS = [block for page in PAGES
           for block in blocks_of(page, (SOURCE / page).read_text(encoding="utf-8"))]
 

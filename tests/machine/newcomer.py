@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Runs every block of PAGES as it is written, each page in an empty Debian, as a user who has sudo:
+"""Runs every block of READERS as it is written, the pages of each reader in an empty Debian, as a user who has sudo:
 newcomer.py ROOT SOURCES [--quick] [--from PLACE] [--packages DIR]. As root. ROOT is a Debian with systemd and sudo; SOURCES a clone."""
 import argparse
 import contextlib
@@ -17,7 +17,8 @@ import time
 from blocks import blocks_of, fits, session_of
 from machine import Container, require
 
-PAGES = ("README.md", "docs/installing.md", "docs/developing.md")
+READERS = (("README.md", "docs/protocol.md"), ("docs/installing.md", "docs/configuration.md"), ("docs/developing.md",))
+READER_OF = {page: i for i, pages in enumerate(READERS) for page in pages}
 USER, HOME = "newcomer", "/home/newcomer"
 TIMEOUT_S = 4 * 3600
 # What stands for the devices that the reader writes into the configuration.
@@ -95,18 +96,18 @@ def main():
     parser.add_argument("--packages", type=pathlib.Path, metavar="DIR", help="take these packages and pass over ./run package")
     arguments = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # the container ends with it
-    blocks = [block for page in PAGES for block in blocks_of(page, (arguments.sources / page).read_text(encoding="utf-8"))]
+    blocks = [block for page in READER_OF for block in blocks_of(page, (arguments.sources / page).read_text(encoding="utf-8"))]
     places = [block.place for block in blocks]
     require(arguments.first is None or arguments.first in places, f"no block {arguments.first}; there are: {' '.join(places)}")
     blocks = blocks[places.index(arguments.first):] if arguments.first else blocks
-    pages = itertools.groupby(blocks, key=lambda block: block.page)
-    failed = sum(run_page(arguments, list(of_page)) for _, of_page in pages)
+    readers = itertools.groupby(blocks, key=lambda block: READER_OF[block.page])
+    failed = sum(run_reader(arguments, list(of_reader)) for _, of_reader in readers)
     print(f"{failed} of {len(blocks)} blocks failed", flush=True)
     return 1 if failed else 0
 
 
-def run_page(arguments, blocks):
-    """Each page begins on an empty Debian, as its reader does. @return how many of its blocks failed"""
+def run_reader(arguments, blocks):
+    """Each reader begins on an empty Debian. @return how many of its blocks failed"""
     empty = arguments.root.resolve()
     root = empty.with_name(empty.name + ".page")
     subprocess.run(["rm", "-rf", root], check=True)
