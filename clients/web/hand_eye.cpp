@@ -19,7 +19,6 @@
 #include "clients/web/away.hpp"
 #include "clients/web/look_folder.hpp"
 #include "core/geometry/robot_pose.hpp"
-#include "core/printable.hpp"
 #include "core/result.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/system/file_descriptor.hpp"
@@ -234,16 +233,11 @@ std::optional<Refusal> HandEye::carry_out(const json& body) {
 }
 
 std::optional<Refusal> HandEye::choose(const json& body) {
-  json choices = json::object();
-  for (const auto& [key, value] : body.items()) {
-    static const std::array<std::string_view, 3> kOthers = {"action", "pose", "look"};
-    if (std::ranges::find(kOthers, key) != kOthers.end()) continue;
-    static const std::array<std::string_view, 6> kKnown = {"mounted", "poses",       "board",
-                                                           "ruler",   "distance_mm", "measured_mm"};
-    if (std::ranges::find(kKnown, key) == kKnown.end())
-      return wrong("no such parameter: \"" + printable(key, 64) + "\"");
-    choices[key] = value;
-  }
+  if (auto refused = unknown_parameter(
+          body, {"mounted", "poses", "board", "ruler", "distance_mm", "measured_mm", "action", "pose", "look"}))
+    return refused;
+  json choices = body;
+  for (const char* other : {"action", "pose", "look"}) choices.erase(other);
   if (const std::string fault = fault_of(choices); !fault.empty()) return wrong(fault);
   if (auto made = make_folder(folder_); !made) return broken(made.error());
   if (auto kept = write_file_atomically(folder_ / "choices.json", choices.dump()); !kept) return broken(kept.error());

@@ -17,7 +17,6 @@
 #include "clients/web/away.hpp"
 #include "clients/web/boards.hpp"
 #include "core/base64.hpp"
-#include "core/nearest_name.hpp"
 #include "core/printable.hpp"
 #include "core/utc_text.hpp"
 #include "drivers/files/file.hpp"
@@ -55,25 +54,6 @@ Answer refusal(int status, const std::string& name, const std::string& message) 
 
 Answer json_answer(const json& value) {
   return {200, "application/json", client::Bytes(to_line(value)), {}, {}};
-}
-
-Answer no_such_parameter(const std::string& name, const std::vector<std::string>& known) {
-  return refusal(400, "invalid_params",
-                 "no such parameter: \"" + printable(name, 64) + "\"" + nearest_hint(name, known));
-}
-
-std::optional<Answer> unknown_parameter(const std::map<std::string, std::string>& query,
-                                        const std::vector<std::string>& known) {
-  for (const auto& [name, value] : query)
-    if (std::ranges::find(known, name) == known.end()) return no_such_parameter(name, known);
-  return std::nullopt;
-}
-
-/// The same for a request's body.
-std::optional<Answer> unknown_parameter(const json& body, const std::vector<std::string>& known) {
-  for (const auto& [name, value] : body.items())
-    if (std::ranges::find(known, name) == known.end()) return no_such_parameter(name, known);
-  return std::nullopt;
 }
 
 std::string parameter(const Request& request, const char* name) {
@@ -208,8 +188,10 @@ std::optional<Answer> PageServer::refuse(const Request& request) {
   }
   if (route == routes_.end()) return refusal(404, "not_found", "there is nothing at this address");
   const std::string& method = route->second.method;
-  if (request.method == method || (request.method == "HEAD" && method == "GET"))
-    return is_open ? std::nullopt : unknown_parameter(request.query, route->second.names);
+  if (request.method == method || (request.method == "HEAD" && method == "GET")) {
+    const auto unknown = is_open ? std::nullopt : unknown_parameter(request.query, route->second.names);
+    return unknown ? std::optional(answer_of(*unknown)) : std::nullopt;
+  }
   Answer wrong = refusal(405, "invalid_request", "use the method " + method);
   wrong.headers.emplace_back("Allow", method == "GET" ? "GET, HEAD" : method);
   return wrong;
@@ -320,7 +302,7 @@ void PageServer::add_requests() {
   });
   post("/api/scan", false, [this](const Request&, const json& body) { return scan(body); });
   post("/api/project", false, [this](const Request&, const json& body) {
-    if (auto unknown = unknown_parameter(body, {"picture"})) return std::move(*unknown);
+    if (const auto unknown = unknown_parameter(body, {"picture"})) return answer_of(*unknown);
     const auto picture = body.find("picture");
     if (picture == body.end() || !picture->is_string() || *picture == "image")
       return refusal(400, "invalid_params", "\"picture\" must be the name of a picture");
@@ -348,8 +330,8 @@ void PageServer::add_model_requests() {
     return done ? json_answer(*done) : answer_of(done.error());
   });
   post("/api/model/background", false, [this](const Request&, const json& body) {
-    auto unknown = unknown_parameter(body, {});
-    return unknown ? std::move(*unknown) : take_background();
+    const auto unknown = unknown_parameter(body, {});
+    return unknown ? answer_of(*unknown) : take_background();
   });
 }
 
@@ -495,7 +477,7 @@ Answer PageServer::cloud(const Request& request) {
 
 Answer PageServer::scan(const json& body) {
   json params{{"format", "ply"}, {"coordinate_frame", "rig"}, {"timeout_ms", 60'000}, {"transport", "memfd"}};
-  if (auto unknown = unknown_parameter(body, {kScanKeys.begin(), kScanKeys.end()})) return std::move(*unknown);
+  if (const auto unknown = unknown_parameter(body, {kScanKeys.begin(), kScanKeys.end()})) return answer_of(*unknown);
   params.update(body);
   // Organised, because a PLY of pixels does not contain their positions; the page makes both files from it.
   if (params.value("density", json()) == "pixels") params["format"] = "pcd";

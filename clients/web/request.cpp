@@ -12,6 +12,10 @@
 #include <boost/beast/core/string.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/parser.hpp>
+#include <nlohmann/json.hpp>
+
+#include "core/nearest_name.hpp"
+#include "core/printable.hpp"
 
 namespace slsd::web {
 namespace {
@@ -137,6 +141,22 @@ HeadEnd find_head_end(std::string_view received) {
     line_begins = false;
   }
   return {};
+}
+
+std::optional<Refusal> unknown_parameter(const std::map<std::string, std::string>& query,
+                                         const std::vector<std::string>& known) {
+  for (const auto& [name, value] : query) {
+    if (std::ranges::find(known, name) != known.end()) continue;
+    return Refusal{400, "invalid_params",
+                   "no such parameter: \"" + printable(name, 64) + "\"" + nearest_hint(name, known)};
+  }
+  return std::nullopt;
+}
+
+std::optional<Refusal> unknown_parameter(const nlohmann::json& body, const std::vector<std::string>& known) {
+  std::map<std::string, std::string> names;
+  for (const auto& [name, value] : body.items()) names.emplace(name, "");
+  return unknown_parameter(names, known);
 }
 
 tl::expected<Request, Refusal> read_head(std::string_view head) {

@@ -7,7 +7,9 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include <nlohmann/json_fwd.hpp>
 #include <tl/expected.hpp>
 
 namespace slsd::web {
@@ -56,5 +58,13 @@ struct HeadEnd {
 /// @param head  of the length from find_head_end()
 /// @thread reentrant
 [[nodiscard]] tl::expected<Request, Refusal> read_head(std::string_view head);
+
+/// Refuses a query with a parameter that is not among the known ones, and names the nearest of these.
+/// @thread reentrant
+[[nodiscard]] std::optional<Refusal> unknown_parameter(const std::map<std::string, std::string>& query,
+                                                       const std::vector<std::string>& known);
+/// The same for the object in a request's body.
+[[nodiscard]] std::optional<Refusal> unknown_parameter(const nlohmann::json& body,
+                                                       const std::vector<std::string>& known);
 
 }  // namespace slsd::web

@@ -341,6 +341,7 @@ class Requests(HandEye):
                           {**right, "ruler": "200:199"}, {**right, "distance_mm": "near"}, {**right, "measured_mm": [1, 2]},
                           {**right, "output": "/etc/passwd"}, {**right, "from": "/"}):
                 self.assertEqual(name_of(web.post("/api/hand_eye/act", **wrong)), (400, "invalid_params"), wrong)
+            self.assertIn("did you mean distance_mm?", web.post("/api/hand_eye/act", **right, distance=5)[2].decode())
             for look in ("", "pose_00", "../pose_00", "..", "/etc", 5, None, "pose_00/../.."):
                 self.assertEqual(name_of(web.post("/api/hand_eye/act", action="drop", look=look)), (404, "not_found"), look)
             self.assertFalse(self.looks.exists() and any(each.name.startswith("pose") for each in self.looks.rglob("*")))

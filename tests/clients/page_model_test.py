@@ -199,6 +199,7 @@ class Requests(ModelTest):
                           {"action": "start", "box": [0, 0, "0", 1, 1, 1]}, {"action": "start", "voxel_mm": 0},
                           {"action": "build", "turntable": True, "views": 12}):
                 self.assertEqual(name_of(web.post("/api/model/act", **wrong)), (400, "invalid_params"), wrong)
+            self.assertIn("did you mean voxel_mm?", web.post("/api/model/act", action="build", voxel=1)[2].decode())
             for action in ("stop", "next", "build"):
                 self.assertEqual(name_of(web.post("/api/model/act", action=action)), (409, "not_now"), action)
             self.assertEqual(name_of(web.post("/api/model/act", action="start", use_background=True)), (409, "not_now"))

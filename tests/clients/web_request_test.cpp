@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include <map>
 #include <regex>
 #include <string>
 #include <vector>
@@ -153,6 +155,20 @@ RC_GTEST_PROP(ReadHead, TakesNothingThatHasTwoMeanings, ()) {
       std::regex_search(head, length, std::regex("\r\ncontent-length:[ \\t]*([0-9]+)", std::regex::icase));
   RC_ASSERT(request->body_bytes == (told ? std::stoull(length[1]) : 0U));
   RC_ASSERT(head.starts_with(request->method + " " + request->path));
+}
+
+TEST(UnknownParameter, NamesTheNearestOfAQueryOrABody) {
+  const std::vector<std::string> known{"density", "camera"};
+  EXPECT_FALSE(unknown_parameter(std::map<std::string, std::string>{{"camera", ""}}, known));
+  EXPECT_FALSE(unknown_parameter(nlohmann::json::object(), known));
+  const auto query = unknown_parameter(std::map<std::string, std::string>{{"camera", ""}, {"densty", "pixels"}}, known);
+  const auto body = unknown_parameter({{"camera", 1}, {"densty", "pixels"}}, known);
+  ASSERT_TRUE(query && body);
+  EXPECT_EQ(query->status, 400);
+  EXPECT_EQ(query->name, "invalid_params");
+  EXPECT_EQ(query->message, "no such parameter: \"densty\"; did you mean density?");
+  EXPECT_EQ(body->message, query->message);
+  EXPECT_EQ(unknown_parameter(nlohmann::json{{"\n", 0}}, known)->message.find('\n'), std::string::npos);
 }
 
 }  // namespace

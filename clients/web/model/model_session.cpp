@@ -12,7 +12,6 @@
 #include <system_error>
 #include <utility>
 
-#include "core/printable.hpp"
 #include "core/result.hpp"
 #include "drivers/files/file.hpp"
 #include "drivers/system/file_descriptor.hpp"
@@ -64,17 +63,16 @@ bool is_box(const json& value) {
 
 /// The choices of a request. @param modes  also those that say how the object turns
 tl::expected<json, Refusal> choices_of(const json& body, bool modes) {
-  json choices = json::object();
-  for (const auto& [key, value] : body.items()) {
-    if (key == "action") continue;
-    const bool is_flag = key == "close" || key == "use_background" ||
-                         (modes && (key == "until_closed" || key == "turntable" || key == "colour"));
-    const bool is_number = key == "voxel_mm" || (modes && key == "views");
-    if (!is_flag && !is_number && key != "box")
-      return tl::unexpected(invalid("no such parameter: \"" + printable(key, 64) + "\""));
-    if (is_flag && !value.is_boolean()) return tl::unexpected(invalid("\"" + key + "\" must be true or false"));
-    choices[key] = value;
+  std::vector<std::string> known{"action", "close", "use_background", "box", "voxel_mm"};
+  if (modes) known.insert(known.end(), {"until_closed", "turntable", "colour", "views"});
+  if (auto refused = unknown_parameter(body, known)) return tl::unexpected(*refused);
+  for (const char* flag : {"close", "use_background", "until_closed", "turntable", "colour"}) {
+    const auto value = body.find(flag);
+    if (value != body.end() && !value->is_boolean())
+      return tl::unexpected(invalid("\"" + std::string(flag) + "\" must be true or false"));
   }
+  json choices = body;
+  choices.erase("action");
   if (choices.contains("box") && !is_box(choices["box"]))
     return tl::unexpected(invalid("\"box\" must be the least x, y and z, and the greatest, mm"));
   if (choices.contains("voxel_mm") && !is_number_in(choices["voxel_mm"], 0.01, 100))
