@@ -120,7 +120,7 @@ Result<Frame> FileCamera::deliver(MonotonicTime exposure_start) {
   const auto image = light_ == Picture::kPattern ? next_image() : image_in_light();
   if (!image) return tl::unexpected(image.error());
   const GreyView pixels = view(**image);
-  if (format_of(pixels) != pool_->format()) return fail_format(format_of(pixels));
+  if (const FrameFormat format = format_of(pixels); format != pool_->format()) return fail_format(format);
   auto frame = pool_->lend(pixels, next_sequence_ - 1, exposure_start);
   if (!frame) return fail_busy();
   if (light_ == Picture::kPattern) return std::move(*frame);
@@ -173,7 +173,12 @@ tl::unexpected<Error> FileCamera::fail_busy() const {
               options_.name);
 }
 
-tl::unexpected<Error> FileCamera::fail_format(const FrameFormat& format) const {
+// If the first image has another format now, too, others have replaced the images: opening adopts them.
+tl::unexpected<Error> FileCamera::fail_format(const FrameFormat& format) {
+  if (const auto first = folder_.image(0); first && format_of(view(**first)) != pool_->format())
+    return fail(ErrorCode::kDisconnected,
+                "other images replaced those of " + format_text(pool_->format()) + ": the camera opens again",
+                options_.path.string());
   const std::string which =
       light_ == Picture::kPattern
           ? "image " + std::to_string((patterns_ - 1) % folder_.size() + 1) + " of " + std::to_string(folder_.size())

@@ -51,7 +51,8 @@ struct FileCameraOptions {
 ///
 /// Besides the errors of every camera, capture() gives: kNotFound if loop is off and all images were shown; kMismatch
 /// for an image of another size or depth than the first; errors of read_image(). That image's frame is lost, and the
-/// camera continues with the next. kDisconnected means that the folder or file is gone.
+/// camera continues with the next. kDisconnected means that the folder or file is gone, or that the first image now has
+/// another size or depth, too: open() adopts it.
 /// @thread thread-bound, except cancel()
 class FileCamera final : public Camera {
  public:
@@ -80,7 +81,7 @@ class FileCamera final : public Camera {
   [[nodiscard]] Result<> configure(const FrameFormat& format);
   [[nodiscard]] tl::unexpected<Error> fail_late() const;
   [[nodiscard]] tl::unexpected<Error> fail_busy() const;
-  [[nodiscard]] tl::unexpected<Error> fail_format(const FrameFormat& format) const;
+  [[nodiscard]] tl::unexpected<Error> fail_format(const FrameFormat& format);
 
   FileCameraOptions options_;
   CameraDescription description_;

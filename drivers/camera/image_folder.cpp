@@ -68,7 +68,7 @@ Result<> ImageFolder::list_folder() {
 Result<const GreyImage*> ImageFolder::image(std::size_t i) {
   Entry& entry = images_[i];
   const auto version = version_of(entry.path);
-  const bool gone = !version && errno == ENOENT;
+  const bool gone = !version && (errno == ENOENT || errno == ENOTDIR);
   if (!version && !version_of(path_)) return fail(ErrorCode::kDisconnected, "is gone; put it back", path_.string());
   // Its images may have been replaced by others.
   if (gone) return fail(ErrorCode::kDisconnected, "is gone; the folder is listed again", entry.path.string());

@@ -11,7 +11,7 @@ import unittest
 
 from client import RpcError
 from point_cloud import vertices
-from service import SCENE, Service, slsd
+from service import SCENE, Service, slsd, wait_until
 
 F_GET_SEALS = 1034
 ALL_SEALS = 0xF
@@ -214,6 +214,27 @@ class Faults(unittest.TestCase):
                 client.call("scan")
             self.assertEqual(caught.exception.name, "mismatch")
             self.assertIn("640x480", str(caught.exception))
+
+    def test_images_of_another_size_open_the_camera_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            frame = pathlib.Path(folder) / "frame.png"
+
+            def put(image):
+                part = frame.with_suffix(".part")
+                part.write_bytes((SCENE / image).read_bytes())
+                part.rename(frame)
+            put("frame.png")
+            with Service(camera_path=folder) as service, service.client() as client:
+                client.call("scan")
+                for image, size in (("small.png", 640), ("frame.png", 1600)):
+                    put(image)
+                    with self.assertRaises(RpcError) as caught:
+                        client.call("scan")
+                    self.assertEqual(caught.exception.name, "disconnected")
+                    self.assertIn("other images replaced", str(caught.exception))
+                    wait_until(lambda: client.call("status")[0]["ready"], "the camera")
+                    self.assertEqual(client.call("status")[0]["cameras"][0]["width_px"], size)
+                self.assertGreater(client.call("scan")[0]["points"], 2000)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 
 // What the camera makes of images and folders that are not as they should be.
 #include <filesystem>
+#include <string>
 
 #include <gmock/gmock.h>
 
@@ -60,6 +61,39 @@ TEST_F(FileCameraTest, RefusesAnotherDepthThanTheFirst) {
   EXPECT_EQ(next_error(camera), ErrorCode::kMismatch);
 }
 
+TEST_F(FileCameraTest, OpensAgainWhenOtherImagesReplaceItsOwn) {
+  test::record(folder_, 3);
+  FileCamera camera(options());
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+  const auto write = [this](const std::string& name) {
+    folder_.write(name, test::pnm_bytes(samples_of(ramp8(24, 16))));
+  };
+  write("frame-1.pgm");
+  EXPECT_EQ(next_error(camera), ErrorCode::kMismatch);  // the first is as it was
+  EXPECT_EQ(next(camera), 2);
+  write("frame-2.pgm"), write("frame-0.pgm");
+  const auto replaced = camera.capture(far_away());
+  EXPECT_EQ(replaced.error().code, ErrorCode::kDisconnected);
+  EXPECT_THAT(replaced.error().message, HasSubstr("replaced those of 12x8 with 8 bits"));
+  EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(camera.description().width_px, 24);
+  for (int i = 0; i < 4; ++i) EXPECT_EQ(format_of(camera.capture(far_away())->image()).width_px, 24);
+}
+
+TEST_F(FileCameraTest, OpensAgainWhenAnotherImageReplacesTheOnlyOne) {
+  folder_.write("only.pgm", test::pnm_bytes(samples_of(ramp8(12, 8))));
+  FileCameraOptions one = options();
+  one.path = folder_.path() / "only.pgm";
+  FileCamera camera(one);
+  ASSERT_TRUE(camera.open());
+  folder_.write("only.pgm", test::pnm_bytes(samples_of(ramp16(12, 8))));
+  EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(format_of(camera.capture(far_away())->image()).bytes_per_pixel, 2);
+}
+
 TEST_F(FileCameraTest, RefusesAnotherSizeThanExpected) {
   test::record(folder_, 1);
   FileCameraOptions expecting = options();
@@ -114,6 +148,23 @@ TEST_F(FileCameraTest, IsDisconnectedWhenItsFolderGoes) {
   std::filesystem::rename(path, folder_.path() / "elsewhere");
   EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
   std::filesystem::rename(folder_.path() / "elsewhere", path);
+  EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+}
+
+TEST_F(FileCameraTest, IsDisconnectedWhenAFileTakesThePlaceOfItsFolder) {
+  const std::filesystem::path path = folder_.path() / "frames.pgm";
+  std::filesystem::create_directory(path);
+  const std::string image = test::pnm_bytes(samples_of(ramp8(12, 8)));
+  folder_.write("frames.pgm/a.pgm", image);
+  FileCameraOptions below = options();
+  below.path = path;
+  FileCamera camera(below);
+  ASSERT_TRUE(camera.open());
+  EXPECT_EQ(next(camera), 0);
+  std::filesystem::remove_all(path);
+  folder_.write("frames.pgm", image);
   EXPECT_EQ(next_error(camera), ErrorCode::kDisconnected);
   ASSERT_TRUE(camera.open());
   EXPECT_EQ(next(camera), 0);
