@@ -119,6 +119,7 @@ std::string wrong_outputs(const ClientOptions& options, const std::string& comma
   if (command == "scan" && wrong.empty()) wrong = wrong_depth_map(options);
   if (command == "record" && options.normals && options.density == "symbols")
     wrong = "--normals needs --density pixels";
+  if (options.stride.value_or(1) > 1 && options.density == "symbols") wrong = "--stride needs --density pixels";
   if (command == "bundle") wrong = wrong_name(options.output, ".tar", "a bundle");
   for (const path& picture : {options.picture, options.cloud_picture, options.image})
     if (wrong.empty()) wrong = wrong_name(picture, ".png", "a picture");

@@ -60,7 +60,7 @@ void add_part(CLI::App* command, ClientOptions& options) {
                    "keep only the most certain point in each cube with this side length")
       ->check(between(0, 1000))
       ->type_name("MM");
-  command->add_option("--stride", options.stride, "keep the pixels of every Nth row and column")
+  command->add_option("--stride", options.stride, "keep the pixels of every Nth row and column; needs --density pixels")
       ->check(between(1, 64))
       ->type_name("N");
   command->add_option("--preset", options.preset, "scan with the settings of this preset, which stay in force")

@@ -160,6 +160,19 @@ class Box(unittest.TestCase):
             self.assertIn(next(iter(params)), message)
         self.assertEqual(len(self.points(**PIXEL_SCAN)), len(self.pixels))
 
+    def test_that_skips_pixels_needs_pixels(self):
+        code, message = self.refused("scan", stride=2)
+        self.assertEqual((code, message), (INVALID_PARAMS, '"stride" above 1 needs "density": "pixels"'))
+        self.assertEqual(self.call("scan", stride=1)["points"], len(self.symbols))
+        self.call("set", cloud={"stride": 2})
+        self.assertEqual(self.call("scan")["points"], len(self.symbols))  # the configured one is for dense clouds alone
+        self.assertEqual(self.refused("scan", stride=3)[0], INVALID_PARAMS)
+        with tempfile.TemporaryDirectory(prefix="slsd-test-") as state, Service(environment={"STATE_DIRECTORY": state}) as service, service.client() as client:
+            client.call("set", decode={"density": "pixels"})
+            client.call("preset", action="save", name="dense")
+            client.call("set", decode={"density": None})
+            self.assertGreater(client.call("scan", preset="dense", stride=8)[0]["points"], len(self.symbols))
+
     def test_of_a_plane_drops_what_is_on_it_or_behind(self):
         plane = [0.6, 0.0, -0.8, -1600.0]
         def side(points):
@@ -213,6 +226,13 @@ class Box(unittest.TestCase):
             self.assertEqual(cloud.read_bytes(), kept)
             for wrong in (("--box", "1,2,3"), ("--box", "1,2,3,4,5,x"), ("--stride", "0"), ("--voxel-mm", "-1")):
                 self.assertEqual(slsctl(*words, *wrong).returncode, 2, wrong)
+            for command in (["scan", str(cloud)], ["record", folder + "/record"]):
+                done = slsctl(*words[:2], *command, "--density", "symbols", "--stride", "2")
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertIn("--stride needs --density pixels", done.stderr)
+                done = slsctl(*words[:2], *command, "--stride", "2")
+                self.assertEqual(done.returncode, 1, done.stderr)
+                self.assertIn('"stride" above 1 needs "density": "pixels"', done.stderr)
 
 
 class BoxOfAFile(unittest.TestCase):

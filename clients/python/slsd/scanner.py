@@ -108,7 +108,7 @@ class Scanner:
         plane    drops points on or behind this plane: x, y and z of its unit normal, and its offset along it, mm
         box_frame  the frame of box and plane
         voxel_mm keeps only the most certain point in each cube with this side length
-        stride   keeps the pixels of every Nth row and column
+        stride   keeps the pixels of every Nth row and column; needs density="pixels"
         """
         params = _params(format="ply", preset=preset, transport="memfd" if shared else "inline", timeout_ms=_milliseconds(timeout_s),
                          density=density, normals=normals, texture=texture, colour=colour, ambient=ambient,

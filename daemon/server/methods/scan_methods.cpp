@@ -240,6 +240,7 @@ struct AskedScan {
   FrameCoding frames;
   ScanRequest request;
   std::string preset;  ///< empty: the settings in force
+  bool skips = false;  ///< leaves out rows and columns, by its own parameter
 };
 
 tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceState& state, const Session& session) {
@@ -261,6 +262,7 @@ tl::expected<AskedScan, RpcError> read_scan(const json& params, const ServiceSta
   asked.preset = reader.text("preset");
   const CloudOptions part = read_part(reader, state);
   if (auto error = reader.error()) return tl::unexpected(*error);
+  asked.skips = params.contains("stride") && part.stride > 1;
   if (asked.request.colour && !asked.request.texture)
     return tl::unexpected(
         invalid_params("\"colour\" comes from the frame of \"texture\": leave out \"texture\": false"));
@@ -298,6 +300,8 @@ class PresetHold {
 
 void start_scan(ServiceState& state, const AskedScan& asked, Session& session, Respond respond) {
   if (auto refused = refused_form(asked.form)) return respond(tl::unexpected(*refused));
+  if (asked.skips && !asked.form.dense())
+    return respond(tl::unexpected(invalid_params("\"stride\" above 1 needs \"density\": \"pixels\"")));
   if (auto refused = session.reserve(expected_bytes(state, asked.request, asked.form)))
     return respond(tl::unexpected(*refused));
   state.scanner.scan(asked.request, carry_scan(state, std::move(respond), [asked](const ScanResult& scan) {

@@ -37,7 +37,7 @@ struct ScanOptions {
   std::vector<double> plane;
   std::string box_frame;           ///< of box and plane: "rig" or "robot_base"
   std::optional<double> voxel_mm;  ///< keeps only the most certain point in each cube with this side
-  std::optional<int> stride;       ///< keeps the pixels of every Nth row and column
+  std::optional<int> stride;       ///< keeps the pixels of every Nth row and column; needs density "pixels"
 };
 
 struct StreamOptions {
