@@ -2,13 +2,20 @@
 // Copyright the slsd authors
 #include <malloc.h>
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstdlib>
+#include <exception>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -45,6 +52,23 @@ int not_served(const slsd::Error& error, bool passes) {
   spdlog::critical("{}", why);
   slsd::Notifier().status("does not start: " + slsd::printable(why, 1000));  // as `systemctl status` shows it
   return passes ? slsd::kFailed : kWrongConfiguration;
+}
+
+constexpr std::string_view kNoMemory =
+    "no memory is left: end other programs, or raise the limit (MemoryMax= of the unit, ulimit -v)";
+
+/// Ends the service if memory ran out on a thread that has no request to refuse. The unit starts it again.
+[[noreturn]] void end_thread() noexcept {
+  try {
+    if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::bad_alloc&) {
+    const std::string_view parts[] = {"slsd: ", kNoMemory, "\n"};
+    for (const std::string_view part : parts)
+      if (::write(STDERR_FILENO, part.data(), part.size()) < 0) break;
+    std::_Exit(slsd::kFailed);
+  } catch (...) {  // a bug: its core shows where
+  }
+  std::abort();
 }
 
 using MadeService = slsd::Result<std::unique_ptr<slsd::Service>>;
@@ -90,6 +114,22 @@ int serve(const std::filesystem::path& configuration_file) {
   return served ? slsd::kDone : not_served(served.error(), may_pass(served.error().code));
 }
 
+/// Serves; reports a lack of memory or threads, which libraries throw.
+int serve_within_limits(const std::filesystem::path& configuration_file) {
+  std::set_terminate(end_thread);
+  try {
+    return serve(configuration_file);
+  } catch (const std::bad_alloc&) {
+    return not_served({slsd::ErrorCode::kNoSpace, std::string(kNoMemory), {}}, true);
+  } catch (const std::system_error& error) {
+    return not_served({slsd::ErrorCode::kNoSpace,
+                       "cannot start a thread (" + error.code().message() +
+                           "): raise the limits of memory and threads (MemoryMax= and TasksMax= of the unit, ulimit)",
+                       {}},
+                      true);
+  }
+}
+
 int check_configuration(const slsd::CommandLine& line) {
   const auto checked = slsd::check_configuration(line.configuration);
   const int status = slsd::exit_status(checked);
@@ -107,7 +147,7 @@ int carry_out(const slsd::CommandLine& line) {
   std::error_code ignored;
   const std::filesystem::path file = line.configuration.value_or(slsd::kConfigurationFile);
   const auto absolute = std::filesystem::absolute(file, ignored);
-  return serve(absolute.empty() ? file : absolute);
+  return serve_within_limits(absolute.empty() ? file : absolute);
 }
 
 }  // namespace

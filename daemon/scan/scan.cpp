@@ -89,6 +89,12 @@ void Scan::compute(std::size_t lane) {
   if (on_arm && setup_->check_robot_base()) result_->flange_from_rig = setup_->hand_eye->mount_from_rig;
 }
 
+void Scan::fail_compute(std::size_t lane, Error error) {
+  result_ = tl::unexpected(std::move(error));
+  if (set_) set_->give_back();
+  if (setup_) setup_->dense->drop(lane);
+}
+
 FrameTask::FrameTask(FrameRequest request, Answer answer)
     : TaskOf(request.deadline, std::move(answer)),
       request_(std::move(request)),
@@ -109,6 +115,11 @@ void FrameTask::compute(std::size_t) {
     return;
   }
   result_ = request_.as_png ? png_of(*frame_) : raw_of(*frame_);
+  frame_ = fail_stopping();
+}
+
+void FrameTask::fail_compute(std::size_t, Error error) {
+  result_ = tl::unexpected(std::move(error));
   frame_ = fail_stopping();
 }
 

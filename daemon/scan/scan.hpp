@@ -50,6 +50,7 @@ class Scan final : public TaskOf<ScanResult>, public FrameJob {
   void note_lost(const Error& error);
 
   void compute(std::size_t lane) override;
+  void fail_compute(std::size_t lane, Error error) override;
   void deliver() override { end(std::move(result_)); }
 
  private:
@@ -72,6 +73,7 @@ class FrameTask final : public TaskOf<FrameImage>, public FrameJob {
   void expose(Rig& rig, const ScanSetup& setup, const WaitLimit& limit);
 
   void compute(std::size_t lane) override;
+  void fail_compute(std::size_t lane, Error error) override;
   void deliver() override { end(std::move(result_)); }
 
  private:

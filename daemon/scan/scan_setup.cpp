@@ -153,6 +153,17 @@ void DenseMappers::end_stream() {
   spare_->maps.clear();
 }
 
+void DenseMappers::drop(std::size_t lane) {
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto& [place, mapper] : mappers_)
+      if (mapper) mapper->end_stream();
+    std::erase_if(mappers_, [lane](const auto& mapper) { return mapper.first.second == lane || !mapper.second; });
+  }
+  const std::lock_guard lock(spare_->mutex);
+  spare_->maps.clear();
+}
+
 std::shared_ptr<DenseCloud> DenseMappers::cloud() {
   constexpr std::size_t kSpareMost = 2;
   return {new DenseCloud, [spare = spare_](DenseCloud* cloud) {

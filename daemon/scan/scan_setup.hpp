@@ -65,6 +65,8 @@ class DenseMappers {
  public:
   /// Ends the stream when nobody wants it any more. Frees what was kept of its frames, and spare maps.
   void end_stream();
+  /// Frees a lane's mappers, which stopped in the middle of a frame. The next request makes new ones.
+  void drop(std::size_t lane);
   /// A cloud that reuses the maps of clouds that nobody holds any more. New maps would be tens of megabytes that the
   /// kernel must fill with zeros.
   [[nodiscard]] std::shared_ptr<DenseCloud> cloud();

@@ -12,6 +12,7 @@
 #include "daemon/configuration/settings_over.hpp"
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/rig/devices.hpp"
+#include "daemon/scan/within_memory.hpp"
 #include "drivers/files/encode_png.hpp"
 #include "drivers/log/log_field.hpp"
 #include "drivers/system/thread_name.hpp"
@@ -135,7 +136,7 @@ void Scanner::take_turn(const Turn& turn) {
   // A stop before this line could not see the task.
   if (thread_.get_stop_token().stop_requested()) turn.task->fail_with(stopping());
   heartbeat_.promise(kStepPromise);
-  turn.take();
+  within_memory(turn.take, [&] { turn.task->fail_with(out_of_memory()); });
   const std::lock_guard lock(mutex_);
   under_way_.reset();
 }
@@ -310,7 +311,7 @@ void Scanner::run_chores(const std::stop_token& stop) {
     const auto chore = chores_.pop_until(steady_clock::now() + 1h, stop);
     if (!chore) continue;
     chore_heartbeat_.promise(kWorkPromise);
-    (*chore)({});
+    within_memory([&] { (*chore)({}); }, [&] { (*chore)(tl::unexpected(out_of_memory())); });
     chore_heartbeat_.rest();
   }
   refuse_chores();

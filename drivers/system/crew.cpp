@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <string>
+#include <utility>
 
 #include "drivers/system/thread_name.hpp"
 
@@ -48,7 +50,7 @@ void Crew::run_parts(int parts, Part part, const void* work) {
     on_offer_ = ++call_;
   }
   changed_.notify_all();
-  for (int i = next_++; i < parts; i = next_++) part(work, i, 0);
+  take_parts(0, part, work, parts);
   {
     const std::lock_guard lock(mutex_);
     on_offer_ = 0;
@@ -57,6 +59,18 @@ void Crew::run_parts(int parts, Part part, const void* work) {
   stay_awake([this] { return helping_ == 0; });
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [this] { return helping_ == 0; });
+  if (const auto failed = std::exchange(failed_, nullptr)) std::rethrow_exception(failed);
+}
+
+// If memory runs out in a part, the others are dropped, and the caller throws after the last helper ended.
+void Crew::take_parts(int worker, Part part, const void* work, int parts) {
+  try {
+    for (int i = next_++; i < parts; i = next_++) part(work, i, worker);
+  } catch (...) {
+    next_ = parts;
+    const std::lock_guard lock(mutex_);
+    failed_ = std::current_exception();
+  }
 }
 
 void Crew::help(int worker, const std::stop_token& stop) {
@@ -70,7 +84,7 @@ void Crew::help(int worker, const std::stop_token& stop) {
     const void* const work = work_;
     const int parts = parts_;
     lock.unlock();
-    for (int i = next_++; i < parts; i = next_++) part(work, i, worker);
+    take_parts(worker, part, work, parts);
     lock.lock();
     --helping_;
     lock.unlock();

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -44,6 +45,7 @@ class Crew final : public Executor {
 
  private:
   void help(int worker, const std::stop_token& stop);
+  void take_parts(int worker, Part part, const void* work, int parts);
   /// Tells whether parts remain that no helper has tried, and whether a processor is free for one more helper.
   [[nodiscard]] bool wants(std::uint64_t done) const {
     const std::uint64_t call = on_offer_;
@@ -61,6 +63,7 @@ class Crew final : public Executor {
   std::atomic<std::uint64_t> on_offer_ = 0;  // the call that offers parts; 0: none
   std::atomic<int> helping_ = 0, turns_ = 0;
   std::atomic<int> next_ = 0;
+  std::exception_ptr failed_;  // what a part of this call threw
   std::vector<std::jthread> threads_;
 };
 

@@ -5,6 +5,7 @@
 import contextlib
 import os
 import pathlib
+import re
 import resource
 import signal
 import socket
@@ -249,6 +250,34 @@ class Life(unittest.TestCase):
                 self.assertIn("STATUS=does not start: ", told)
                 self.assertIn("no such table or key: a\\nREADY=1", told)
                 self.assertNotIn("\n", told.strip())
+
+    @unittest.skipIf(os.environ.get("SLSD_SANITIZE"), "sanitizers need address space without limit")
+    def test_memory_that_runs_out_fails_the_request_alone(self):
+        with Service() as service, service.client() as client:
+            service.wait_ready()
+            symbols = client.call("scan")[0]["points"]
+            status = pathlib.Path(f"/proc/{service.process.pid}/status").read_text(encoding="utf-8")
+            used = int(re.search(r"VmSize:\s+(\d+) kB", status)[1]) * 1024
+            resource.prlimit(service.process.pid, resource.RLIMIT_AS, (used + (16 << 20), resource.RLIM_INFINITY))
+            with self.assertRaises(RpcError) as caught:
+                client.call("scan", density="pixels")
+            self.assertEqual(caught.exception.name, "no_space")
+            self.assertIn("no memory is left", str(caught.exception))
+            self.assertEqual(client.call("scan")[0]["points"], symbols)
+            resource.prlimit(service.process.pid, resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+            self.assertGreater(client.call("scan", density="pixels")[0]["points"], 100 * symbols)
+
+    @unittest.skipIf(os.environ.get("SLSD_SANITIZE"), "sanitizers need address space without limit")
+    def test_start_without_enough_memory_says_so(self):
+        for mib in (180, 210, 240, 270):
+            service = Service(preexec=lambda mib=mib: resource.setrlimit(resource.RLIMIT_AS, (mib << 20, mib << 20)))
+            service.launch()
+            wait_until(lambda service=service: service.socket.exists() or service.process.poll() is not None, "the start")
+            if service.process.poll() is None:
+                self.assertEqual(service.stop()[0], 0)
+            else:
+                self.assertEqual(service.process.returncode, 1, service.log_text())
+                self.assertRegex(service.log_text(), "no memory is left: |cannot start a thread ")
 
     def test_runs_out_of_descriptors_and_recovers(self):
         def few_descriptors():

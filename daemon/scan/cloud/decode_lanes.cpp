@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/scan/within_memory.hpp"
 #include "drivers/system/thread_name.hpp"
 
 namespace slsd {
@@ -103,7 +104,8 @@ void DecodeLanes::run(std::size_t thread, const std::stop_token& stop) {
     lock.unlock();
     changed_.notify_all();  // push() waits for room
     heartbeats_[thread].promise(kWorkPromise);
-    if (!stop.stop_requested()) job->compute(lane);
+    if (!stop.stop_requested())
+      within_memory([&] { job->compute(lane); }, [&] { job->fail_compute(lane, out_of_memory()); });
     deliver(*job, turn, lane);
     job.reset();
     heartbeats_[thread].rest();

@@ -13,6 +13,7 @@
 #include <stop_token>
 #include <thread>
 
+#include "core/result.hpp"
 #include "daemon/scan/wait_limit.hpp"
 #include "drivers/camera/frame.hpp"
 #include "drivers/system/heartbeat.hpp"
@@ -26,6 +27,8 @@ class FrameJob {
   /// The long part. Other lanes run other jobs at the same time.
   /// @param lane  the lowest that is free, so that jobs which do not overlap share one lane's buffers
   virtual void compute(std::size_t lane) = 0;
+  /// Follows compute() on the same lane if memory ran out in it. The result is then this error.
+  virtual void fail_compute(std::size_t lane, Error error) = 0;
   /// Delivers the result once. Follows compute(), or replaces it if the service stops. Runs for one job at a time, in
   /// order of arrival.
   virtual void deliver() = 0;

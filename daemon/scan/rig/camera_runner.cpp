@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/scan/message_ids.hpp"
+#include "daemon/scan/within_memory.hpp"
 #include "drivers/camera/file_camera.hpp"
 #include "drivers/log/log_field.hpp"
 #include "drivers/system/thread_name.hpp"
@@ -167,7 +168,7 @@ void CameraRunner::exchange(Replacement replacement) {
   const auto open = [this](std::unique_ptr<Camera> camera) {
     heartbeat_.promise(kPausePromise + camera->open_time_max());
     put(std::move(camera));
-    return camera_->open();
+    return open_camera();
   };
   Result<> opened = open(std::move(replacement.next));
   Result<> outcome;
@@ -213,13 +214,19 @@ void CameraRunner::close() {
   ended_ = true;
 }
 
+Result<> CameraRunner::open_camera() {
+  Result<> opened;
+  within_memory([&] { opened = camera_->open(); }, [&] { opened = tl::unexpected(out_of_memory()); });
+  return opened;
+}
+
 void CameraRunner::open_or_pause(const std::stop_token& stop) {
   heartbeat_.promise(camera_->open_time_max());
   {
     const std::lock_guard lock(mutex_);
     if (status_.state != DeviceState::kAbsent) status_.state = DeviceState::kOpening;
   }
-  const Result<> opened = camera_->open();
+  const Result<> opened = open_camera();
   heartbeat_.promise(kPromise);
   if (!opened && opened.error().code == ErrorCode::kCancelled) return;
   note_opened(opened);
@@ -309,7 +316,10 @@ void CameraRunner::take_frame(const Order& order) {
     const auto longest = camera_->frame_time_max();
     heartbeat_.promise(longest + kPromise);
     const MonotonicTime end = std::min<MonotonicTime>(order.deadline, steady_clock::now() + longest);
-    auto frame = order.exposure == Exposure::kNext ? camera_->capture_next(end) : camera_->capture(end);
+    Result<Frame> frame = fail(ErrorCode::kCancelled, "");
+    within_memory(
+        [&] { frame = order.exposure == Exposure::kNext ? camera_->capture_next(end) : camera_->capture(end); },
+        [&] { frame = tl::unexpected(out_of_memory()); });
     if (frame || !goes_on(order, frame.error())) return note_frame(std::move(frame));
   }
 }

@@ -124,6 +124,7 @@ class CameraRunner {
   void exchange(Replacement replacement);
   void put(std::unique_ptr<Camera> camera);
   void cancel();
+  [[nodiscard]] Result<> open_camera();
   void open_or_pause(const std::stop_token& stop);
   void note_found();
   void note_opened(const Result<>& opened);

@@ -10,6 +10,7 @@
 #include <asio/post.hpp>
 #include <nlohmann/json.hpp>
 
+#include "daemon/scan/within_memory.hpp"
 #include "daemon/server/reply.hpp"
 #include "daemon/server/service_state.hpp"
 #include "rpc/message.hpp"
@@ -38,11 +39,20 @@ namespace slsd {
   return reply;
 }
 
+/// Makes a value into a reply, or its error, or that of missing memory.
+template <class Value, class MakeReply>
+std::shared_ptr<Outcome> outcome_of(const Result<Value>& value, const MakeReply& make_reply) {
+  auto outcome = std::make_shared<Outcome>();
+  within_memory([&] { *outcome = value ? make_reply(*value) : tl::unexpected(rpc_error(value.error())); },
+                [&] { *outcome = tl::unexpected(rpc_error(out_of_memory())); });
+  return outcome;
+}
+
 /// Makes an answer into a reply on the scanner's thread and carries it to the event loop's thread.
 template <class Value, class MakeReply>
 Scanner::Answer<Value> carry(ServiceState& state, Respond respond, MakeReply make_reply) {
   return [&events = state.events, respond = std::move(respond), make_reply](Result<Value> value) {
-    auto outcome = std::make_shared<Outcome>(value ? make_reply(*value) : tl::unexpected(rpc_error(value.error())));
+    const auto outcome = outcome_of(value, make_reply);
     asio::post(events, [respond, outcome] { respond(std::move(*outcome)); });
   };
 }

@@ -12,6 +12,7 @@
 #include "core/nearest_name.hpp"
 #include "core/printable.hpp"
 #include "daemon/scan/message_ids.hpp"
+#include "daemon/scan/within_memory.hpp"
 #include "rpc/message.hpp"
 
 namespace slsd {
@@ -88,7 +89,8 @@ void dispatch(ServiceState& state, const Request& request, Session& session, Res
     if (found->role == Role::kAdminister && !is_look && !is_own)
       spdlog::info("{}: by user {} (process {})", found->name, session.peer().user, session.peer().process);
     ++state.requests.by_method[found->name];
-    return found->run(state, request.params, session, std::move(respond));
+    return within_memory([&] { found->run(state, request.params, session, respond); },
+                         [&] { respond(tl::unexpected(rpc_error(out_of_memory()))); });
   }
   std::vector<std::string> names;
   for (const RpcMethod& method : kMethods) names.emplace_back(method.name);

@@ -29,7 +29,7 @@ constexpr double kRateMaxHz = 1000.0;
 template <class MakeReply>
 Scanner::Answer<ScanResult> carry_scan(ServiceState& state, Respond respond, MakeReply make_reply) {
   return [&state, respond = std::move(respond), make_reply](const Result<ScanResult>& scan) {
-    auto outcome = std::make_shared<Outcome>(scan ? make_reply(*scan) : tl::unexpected(rpc_error(scan.error())));
+    const auto outcome = outcome_of(scan, make_reply);
     const MonotonicTime received = scan ? scan->received : MonotonicTime();
     const bool pictured = scan && !scan->picture_png.empty();
     asio::post(state.events, [&state, respond, outcome, received, pictured] {

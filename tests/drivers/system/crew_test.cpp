@@ -4,7 +4,9 @@
 
 #include <atomic>
 #include <chrono>
+#include <new>
 #include <set>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -32,6 +34,27 @@ TEST(Crew, NoTwoAtOnceAreTheSameWorker) {
       EXPECT_EQ(busy.at(worker)++, 0);
       --busy[worker];
     });
+  }
+}
+
+TEST(Crew, ThrowsWhatAPartThrowsOnceAllHaveEnded) {
+  Crew crew(3);
+  for (const int bad : {0, 1, 40, 63}) {
+    std::atomic<int> inside = 0;
+    const auto work = [&](int part, int) {
+      ++inside;
+      if (part == bad) {
+        --inside;
+        throw std::bad_alloc();
+      }
+      std::this_thread::sleep_for(50us);
+      --inside;
+    };
+    EXPECT_THROW(crew.run(64, work), std::bad_alloc);
+    EXPECT_EQ(inside, 0);
+    std::atomic<int> done = 0;
+    crew.run(64, [&](int, int) { ++done; });
+    EXPECT_EQ(done, 64);
   }
 }
 

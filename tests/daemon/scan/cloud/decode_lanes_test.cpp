@@ -4,6 +4,8 @@
 
 #include <atomic>
 #include <future>
+#include <new>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -32,15 +34,33 @@ class NumberJob final : public FrameJob {
     if (work_) work_();
     delivered_.computed = true;
   }
+  void fail_compute(std::size_t lane, Error error) override {
+    EXPECT_EQ(lane, lane_);
+    failed_ = std::move(error);
+  }
   void deliver() override { log_.push_back(delivered_); }
+  [[nodiscard]] const std::optional<Error>& failed() const { return failed_; }
   [[nodiscard]] std::size_t lane() const { return lane_; }
 
  private:
   Delivered delivered_;
   Log& log_;
   std::function<void()> work_;
+  std::optional<Error> failed_;
   std::atomic<std::size_t> lane_{DecodeLanes::kMaxLanes};
 };
+
+TEST(DecodeLanes, FailOnlyTheJobForWhichMemoryRunsOut) {
+  NumberJob::Log delivered;
+  DecodeLanes lanes(1);
+  const auto large = std::make_shared<NumberJob>(1, delivered, [] { throw std::bad_alloc(); });
+  lanes.push(large);
+  lanes.push(std::make_shared<NumberJob>(2, delivered));
+  while (lanes.done() < 2) std::this_thread::yield();
+  EXPECT_EQ(delivered, (NumberJob::Log{{1, false}, {2, true}}));
+  ASSERT_TRUE(large->failed());
+  EXPECT_EQ(large->failed()->code, ErrorCode::kNoSpace);
+}
 
 /// Work that ends when the gate is opened, and tells that it has begun.
 struct Gate {
