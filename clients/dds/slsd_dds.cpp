@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <future>
 #include <optional>
 #include <string>
@@ -54,6 +55,14 @@ void leave_in_time() {
       .detach();
   if (leaving.wait_for(kLongest) != std::future_status::ready)
     std::fprintf(stderr, "slsd-dds: ends without leaving the network in order: others notice when its lease ends\n");
+}
+
+/// @return false: a write hangs
+bool wait_for_signal(const sigset_t& signals) {
+  constexpr timespec kLook{1, 0};
+  while (sigtimedwait(&signals, nullptr, &kLook) < 0)
+    if (slsd::dds::write_hangs()) return false;
+  return true;
 }
 
 int print_pose(const slsd::dds::NetworkOptions& options, const slsd::dds::RobotFrames& frames) {
@@ -177,8 +186,10 @@ int main(int argc, char** argv) {
   }
   if (!bridge) return failed(bridge.error());
   if (!merged) return failed(merged.error());
-  int signal = 0;
-  sigwait(&ends, &signal);
+  if (!wait_for_signal(ends)) {
+    std::fprintf(stderr, "slsd-dds: the network takes nothing more: Fast DDS hangs in a write; start slsd-dds again\n");
+    std::_Exit(1);  // the unit starts it again
+  }
   leave_in_time();
   std::_Exit(0);  // its threads may be waiting for the service
 }

@@ -10,7 +10,6 @@
 #include <map>
 #include <mutex>
 #include <set>
-#include <shared_mutex>
 #include <utility>
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
@@ -25,7 +24,9 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 
+#include "network/leaving.hpp"
 #include "network/participant.hpp"
+#include "network/write_watch.hpp"
 
 namespace slsd::dds {
 namespace {
@@ -39,6 +40,7 @@ constexpr std::uint8_t kCycloneVendor[] = {0x01, 0x10};
 constexpr int kTransformsKept = 100;  // as tf2 does
 constexpr auto kHearing = 1s;         // time to discover a client's reply reader
 constexpr auto kBlockingMax = 5;      // seconds that a write waits until the previous one is sent
+constexpr int kLooksMost = 30;        // of one second each; longer than any limit of a write
 constexpr auto kBacklogMax = 1s;      // time for earlier data to be sent
 
 /// Samples of any type, as bytes.
@@ -158,8 +160,7 @@ class Backlog {
 };
 
 struct Writer::State : fast::DataWriterListener {
-  State(Events& heard, std::shared_mutex& in_use, const bool& has_left, Backlog* waiting)
-      : events(heard), use(in_use), left(has_left), backlog(waiting) {}
+  State(Events& heard, Leaving& of_all, Backlog* waiting) : events(heard), leaving(of_all), backlog(waiting) {}
   void on_publication_matched(fast::DataWriter*, const fast::PublicationMatchedStatus& info) override {
     const std::lock_guard lock(events.mutex);
     const auto guid = bytes_of(rtps::iHandle2GUID(info.last_subscription_handle));
@@ -169,15 +170,14 @@ struct Writer::State : fast::DataWriterListener {
   }
 
   Events& events;
-  std::shared_mutex& use;
-  const bool& left;
-  Backlog* backlog;  ///< set for a sensor topic
-  fast::DataWriter* writer = nullptr;
+  Leaving& leaving;
+  Backlog* backlog;                    ///< set for a sensor topic
+  fast::DataWriter* writer = nullptr;  ///< null if it was made after the network was left
   std::set<std::array<std::uint8_t, 16>> readers;
 };
 
 struct Reader::State : fast::DataReaderListener {
-  State(Events& heard, std::shared_mutex& in_use, const bool& has_left) : events(heard), use(in_use), left(has_left) {}
+  State(Events& heard, Leaving& of_all) : events(heard), leaving(of_all) {}
   void on_data_available(fast::DataReader*) override {
     const std::lock_guard lock(events.mutex);
     arrived = true;
@@ -188,9 +188,8 @@ struct Reader::State : fast::DataReaderListener {
   }
 
   Events& events;
-  std::shared_mutex& use;
-  const bool& left;
-  fast::DataReader* reader = nullptr;
+  Leaving& leaving;
+  fast::DataReader* reader = nullptr;  ///< null if it was made after the network was left
   std::atomic<bool> arrived{false};
   std::atomic<int> writers{0};
 };
@@ -231,19 +230,18 @@ struct Network::State : fast::DomainParticipantListener {
   }
 
   void leave() {
-    const std::unique_lock lock(use);
-    if (std::exchange(left, true) || !participant) return;
+    const auto alone = leaving.leave();
+    if (!alone.owns_lock() || !participant) return;
     participant->set_listener(nullptr);
     participant->delete_contained_entities();
     fast::DomainParticipantFactory::get_instance()->delete_participant(participant);
   }
 
   Events events;
-  std::shared_mutex use;  ///< shared by all callers of DDS; exclusive when leaving
-  bool left = false;
+  Leaving leaving;  ///< all that call DDS use it
   bool best_effort;
   Backlog backlog;
-  std::mutex making;  ///< guards the endpoints below, before `others`
+  std::mutex making;  ///< guards the endpoints below, before `others`; locked before a use of `leaving`
   std::map<std::string, fast::Topic*> topics;
   std::list<Writer::State> writers;
   std::list<Reader::State> readers;
@@ -259,6 +257,7 @@ namespace {
 
 std::mutex networks_mutex;
 std::set<Network::State*> networks;
+WriteWatch write_watch;
 
 Error not_made(const std::string& what) {
   return fail(ErrorCode::kIo, "Fast DDS cannot create it", what).value();
@@ -276,8 +275,8 @@ bool Writer::write_bytes(const Bytes& bytes, const Requester* to) const {
     std::unique_lock lock(state_->events.mutex);
     state_->events.changed.wait_for(lock, kHearing, [&] { return state_->readers.contains(to->guid); });
   }
-  const std::shared_lock lock(state_->use);
-  if (state_->left) return true;
+  const auto use = state_->leaving.use();
+  if (!use.owns_lock()) return true;
   rtps::WriteParams related;
   if (to && !to->is_cyclone) {
     related.related_sample_identity().writer_guid(guid_of(to->guid));
@@ -289,6 +288,7 @@ bool Writer::write_bytes(const Bytes& bytes, const Requester* to) const {
     // sample is still under way when the next is due.
     state_->writer->assert_liveliness();
   }
+  const WriteWatch::Writing writing(write_watch);
   return state_->writer->write(const_cast<Bytes*>(&bytes), related);
 }
 
@@ -301,8 +301,9 @@ int Reader::writer_count() const {
 }
 
 std::optional<Sample> Reader::take() const {
-  const std::shared_lock lock(state_->use);
-  if (state_->left) return std::nullopt;
+  const auto use = state_->leaving.use();
+  if (!use.owns_lock()) state_->arrived = false;  // otherwise wait_for() would not wait
+  if (!use.owns_lock()) return std::nullopt;
   while (true) {
     state_->arrived = false;  // reset before reading, so that later arrivals are not missed
     Sample sample;
@@ -341,6 +342,10 @@ void leave_networks() {
   for (Network::State* network : networks) network->leave();
 }
 
+bool write_hangs() {
+  return write_watch.look() >= kLooksMost;
+}
+
 Result<Network> Network::open(const NetworkOptions& options) {
   auto* factory = fast::DomainParticipantFactory::get_instance();
   factory->load_profiles();  // the user's own profiles, from FASTRTPS_DEFAULT_PROFILES_FILE
@@ -362,6 +367,8 @@ Result<Network> Network::open(const NetworkOptions& options) {
 
 void Network::show_node(const std::string& name_space) {
   const std::lock_guard lock(state_->making);
+  const auto use = state_->leaving.use();
+  if (!use.owns_lock()) return;
   const auto& type = ros::ParticipantEntitiesInfo::kType;
   if (!state_->node_writer) {
     state_->node_writer = state_->publisher->create_datawriter(state_->topic(type, "ros_discovery_info"),
@@ -374,8 +381,10 @@ void Network::show_node(const std::string& name_space) {
 
 Result<Writer> Network::writer(const ros::Type& type, const std::string& topic, Quality quality) const {
   const std::lock_guard lock(state_->making);
-  auto& made = state_->writers.emplace_back(state_->events, state_->use, state_->left,
+  const auto use = state_->leaving.use();
+  auto& made = state_->writers.emplace_back(state_->events, state_->leaving,
                                             quality == Quality::kSensor ? &state_->backlog : nullptr);
+  if (!use.owns_lock()) return Writer(&made);
   made.writer = state_->publisher->create_datawriter(state_->topic(type, topic),
                                                      writer_qos(type, quality, state_->best_effort), &made);
   if (!made.writer) return tl::unexpected(not_made(topic));
@@ -386,7 +395,9 @@ Result<Writer> Network::writer(const ros::Type& type, const std::string& topic, 
 
 Result<Reader> Network::reader(const ros::Type& type, const std::string& topic, Quality quality) const {
   const std::lock_guard lock(state_->making);
-  auto& made = state_->readers.emplace_back(state_->events, state_->use, state_->left);
+  const auto use = state_->leaving.use();
+  auto& made = state_->readers.emplace_back(state_->events, state_->leaving);
+  if (!use.owns_lock()) return Reader(&made);
   made.reader = state_->subscriber->create_datareader(state_->topic(type, topic),
                                                       reader_qos(type, quality, state_->best_effort), &made);
   if (!made.reader) return tl::unexpected(not_made(topic));

@@ -109,6 +109,9 @@ class Network {
 /// Announces that this process leaves all its networks. Later reads and writes do nothing.
 void leave_networks();
 
+/// Tells whether a write hangs in Fast DDS, which then publishes nothing more. Call it once a second.
+[[nodiscard]] bool write_hangs();
+
 /// The advice if this host's socket buffers cannot hold a dense cloud; else empty. @thread reentrant
 [[nodiscard]] std::string receive_buffer_warning();
 
