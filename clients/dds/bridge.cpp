@@ -50,7 +50,7 @@ Result<std::string> calibration_in_force(const std::string& socket) {
     if (!text.empty()) return text;
     return fail(ErrorCode::kNotFound, "not calibrated, so the pose of the projector is unknown: run slsctl calibrate");
   } catch (const client::ScannerError& error) {
-    return fail(ErrorCode::kIo, error.what());
+    return fail(ErrorCode::kIo, error.what(), error.where());
   } catch (const json::exception& error) {
     return fail(ErrorCode::kIo, std::string("the service sent invalid settings: ") + error.what());
   }
@@ -77,6 +77,11 @@ std::optional<std::chrono::system_clock::time_point> time_of_exposure(const json
     return std::chrono::sys_time<std::chrono::nanoseconds>(std::chrono::nanoseconds(exact->get<std::int64_t>()));
   const auto text = told.find("time");
   return text != told.end() && text->is_string() ? time_from_utc(text->get<std::string>()) : std::nullopt;
+}
+
+/// "socket: no service answers there", or the message alone.
+std::string text_of(const client::ScannerError& error) {
+  return error.where().empty() ? error.what() : error.where() + ": " + error.what();
 }
 
 // "tf_late" of "tf_late: ..."
@@ -149,7 +154,7 @@ class Running : public Bridge {
       client::Stream stream = client::Scanner(options_.socket).stream(options);
       while (true) (void)publish(stream.next());  // diagnostics tell why one was not
     } catch (const client::ScannerError& error) {
-      say(error.what());
+      say(text_of(error));
       std::this_thread::sleep_for(kRetry);
     }
   }
@@ -234,7 +239,7 @@ class Running : public Bridge {
       const std::string why = cloud.why_empty.empty() ? "" : ": " + cloud.why_empty;
       return {true, std::to_string(cloud.size()) + " points, scan " + cloud.scan + why};
     } catch (const client::ScannerError& error) {
-      say(error.what());
+      say(text_of(error));
       return {false, (error.name().empty() ? "" : error.name() + ": ") + error.what()};
     }
   }
@@ -277,7 +282,7 @@ class Running : public Bridge {
         state.worse(Level::kError, "the last cloud is not published: " + why);
       publish_images(scanner);
     } catch (const client::ScannerError& error) {
-      state.worse(Level::kError, error.what());
+      state.worse(Level::kError, text_of(error));
     } catch (const json::exception& error) {
       state.worse(Level::kError, std::string("the service sent an invalid state: ") + error.what());
     }

@@ -10,6 +10,7 @@
 
 #include <slsd/connection.hpp>
 
+#include "clients/access/service_socket.hpp"
 #include "clients/tcp/tcp_server.hpp"
 #include "clients/usage/usage.hpp"
 
@@ -17,8 +18,6 @@ namespace {
 
 using slsd::tcp::AddressRange;
 using slsd::tcp::TcpOptions;
-
-constexpr std::size_t kSocketPathBytesMax = 107;
 
 /// @errors kInvalidArgument: not an address; addresses are missing
 slsd::Result<std::vector<AddressRange>> ranges_of(std::vector<std::string> allow, const std::string& listen) {
@@ -42,8 +41,7 @@ slsd::Result<> serve(TcpOptions options, const std::vector<std::string>& allow, 
   auto ranges = ranges_of(allow, options.listen);
   if (!ranges) return tl::unexpected(ranges.error());
   options.allow = std::move(*ranges);
-  if (options.socket.string().size() > kSocketPathBytesMax)
-    return slsd::fail(slsd::ErrorCode::kInvalidArgument, "the socket's path is longer than 107 bytes", options.socket);
+  if (auto valid = slsd::check_service_socket(options.socket); !valid) return valid;
   auto token = slsd::read_token(token_file);
   if (!token) return tl::unexpected(token.error());
   const std::string listen = options.listen;

@@ -8,6 +8,7 @@
 #include <systemd/sd-daemon.h>
 #include <CLI/CLI.hpp>
 
+#include "clients/access/service_socket.hpp"
 #include "clients/access/token.hpp"
 #include "clients/usage/usage.hpp"
 #include "clients/web/announcement.hpp"
@@ -50,6 +51,7 @@ std::string announce(const PageOptions& options, const Token& token, int port) {
 }
 
 slsd::Result<> serve(const PageOptions& options) {
+  if (auto valid = slsd::check_service_socket(options.socket); !valid) return valid;
   const auto token = token_of(options);
   if (!token) return tl::unexpected(token.error());
   slsd::web::PageServer server(options, *token);

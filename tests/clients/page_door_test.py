@@ -289,6 +289,13 @@ class Door(unittest.TestCase):
                 web.terminate()
                 web.wait()
 
+    def test_a_socket_that_can_never_answer_is_refused(self):
+        for program in (["slsd-web"], ["slsd-tcp", "--token-file", "/dev/null"]):
+            wrong = subprocess.run([BIN / program[0], *program[1:], "--port", "0", "--socket", "/tmp/" + 200 * "x"],
+                                   capture_output=True, text=True, check=False, timeout=TIMEOUT_S)
+            self.assertEqual((wrong.returncode, wrong.stdout, wrong.stderr.count("\n")), (1, "", 1), wrong.stderr)
+            self.assertIn("x: the socket's path is longer than 107 bytes", wrong.stderr)
+
     def test_suggests_the_nearest_option(self):
         wrong = subprocess.run([BIN / "slsd-web", "--prot", "1"], capture_output=True, text=True, check=False)
         self.assertEqual((wrong.returncode, wrong.stdout), (2, ""))
