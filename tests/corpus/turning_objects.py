@@ -4,7 +4,7 @@
 """Writes objects of 15 to 20 cm that render_turning.py can turn, as closed meshes in mm. Needs pymeshlab.
 
 They turn about y, which points down, as in a camera's frame. A jug is round and smooth, and its handle hides part of it. A bracket
-has planes, sharp edges and holes, as machined parts have.
+has planes, sharp edges and holes, as machined parts have. Crossed plates and a single plate show little else than planes.
 """
 import argparse
 import pathlib
@@ -106,12 +106,25 @@ def bracket():
     return combined(body, holes, "difference")
 
 
+def cross():
+    across, foot = box((20, -40, -60), (28, 60, 60)), box((-70, 52, -40), (70, 60, 40))
+    return combined(box((-70, -60, -4), (70, 60, 4)), [across, foot], "union")
+
+
+def plate():
+    cut_off = [rod(20, 40, (25, -15, 0), lies=True), box((-80, 30, -20), (-35, 80, 20))]
+    return combined(box((-70, -60, -5), (70, 60, 5)), cut_off, "difference")
+
+
+OBJECTS = {"jug": jug, "bracket": bracket, "cross": cross, "plate": plate}
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("object", choices=("jug", "bracket"))
+    parser.add_argument("object", choices=OBJECTS)
     parser.add_argument("file", type=pathlib.Path, help="PLY to write")
     given = parser.parse_args()
-    vertices, faces = {"jug": jug, "bracket": bracket}[given.object]()
+    vertices, faces = OBJECTS[given.object]()
     with given.file.open("wb") as file:
         file.write(f"ply\nformat binary_little_endian 1.0\ncomment units mm\nelement vertex {len(vertices)}\n"
                    "property float x\nproperty float y\nproperty float z\n"

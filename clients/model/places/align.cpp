@@ -35,6 +35,16 @@ constexpr double kFewestOverlap = 0.3;
 constexpr double kFewestAgreeing = 0.7;
 constexpr double kGreatestFit = 2.5;
 constexpr double kFewestDetermined = 0.002;
+constexpr double kMostUncertainPx = 2.4;
+/// Errors of neighbouring cells are alike: so many count as one, squared.
+constexpr double kErrorsAlike = 3;
+constexpr double kLeastInformation = 1e-6;
+
+/// What a pixel of the first camera sees at the shot's middle.
+double pixel_mm(const Shot& shot) {
+  const RangeImage& image = shot.views.front().image;
+  return (image.camera_from_rig * shot.middle_mm()).z() / image.lens.fx;
+}
 
 double size_of(const Shot& shot, const Eigen::Vector3d& middle) {
   double sum = 0;
@@ -87,7 +97,7 @@ bool fits(const Alignment& alignment) {
 }
 
 std::string refusal_of(const Alignment& alignment) {
-  if (alignment.determined < kFewestDetermined)
+  if (alignment.determined < kFewestDetermined || alignment.uncertain_px > kMostUncertainPx)
     return "the surface has too little relief to determine " + to_string(alignment.least_determined);
   if (alignment.overlap < kFewestOverlap)
     return fmt::format("only {:.0f} % of its points lie on the surface so far", 100 * alignment.overlap);
@@ -124,6 +134,8 @@ std::optional<Alignment> align(const Shot& shot, std::span<const PlacedShot> ref
   const Eigen::SelfAdjointEigenSolver<Matrix6> motions(sums.relief());
   found.determined = motions.eigenvalues()[0];
   found.least_determined = aligner.motion_of(motions.eigenvectors().col(0), pose);
+  const Eigen::SelfAdjointEigenSolver<Matrix6> certain(sums.sure_information, Eigen::EigenvaluesOnly);
+  found.uncertain_px = kErrorsAlike / std::sqrt(std::max(kLeastInformation, certain.eigenvalues()[0])) / pixel_mm(shot);
   found.fit = kSigmaOfMedian * static_cast<double>(median_in_place(sums.over_sigma));
   return found;
 }

@@ -36,6 +36,8 @@ struct Alignment {
   /// on itself.
   double determined = 0;
   FreeMotion least_determined;
+  /// Standard deviation of the least certain motion, in pixels of the shot.
+  double uncertain_px = 0;
 };
 
 /// Moves a shot onto references: distances from points to planes, weighted by 1/sigma^2 of both, each point paired with

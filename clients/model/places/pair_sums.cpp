@@ -48,7 +48,9 @@ class PairAdder {
     const double weight = robust_weight(off_mm, kSigmas * sigma_mm + motion_mm_) / (sigma_mm * sigma_mm);
     sums_.information.noalias() += weight * row * row.transpose();
     sums_.gradient += weight * off_mm * row;
-    sums_.relief_sum.noalias() += 0.5 * (row * own_row.transpose() + own_row * row.transpose());
+    const Matrix6 both = 0.5 * (row * own_row.transpose() + own_row * row.transpose());
+    sums_.relief_sum += both;
+    sums_.sure_information += weight * both;
   }
   [[nodiscard]] Vector6 row_of(const Eigen::Vector3d& arm, const Eigen::Vector3d& direction) const {
     Vector6 row;
@@ -80,7 +82,7 @@ void PairSums::add_opposite(const PairSums& back) {
   gradient -= back.gradient;
   seen += back.seen;
   over_sigma.insert(over_sigma.end(), back.over_sigma.begin(), back.over_sigma.end());
-  relief_sum += back.relief_sum;
+  relief_sum += back.relief_sum, sure_information += back.sure_information;
 }
 
 void add_pairs(PairSums& sums, const PlacedShot& shot, const PlacedShot& reference, const Pairing& pairing,

@@ -55,6 +55,8 @@ struct PairSums {
   void add_opposite(const PairSums& back);
 
   Matrix6 relief_sum = Matrix6::Zero();  ///< for relief()
+  /// The information of directions that both shots measured: without that of their noise.
+  Matrix6 sure_information = Matrix6::Zero();
 };
 
 /// Adds the pairs of a shot with a reference. @thread reentrant

@@ -33,7 +33,7 @@ constexpr float kEdgeSigmaPx = 2;
 constexpr float kErodedPx = 3;
 /// Cosine between the normals of the ending surface and of the one so many pixels before it, from which on it is flat.
 /// A round one ends elsewhere in each view.
-constexpr float kFlat = 0.98F, kBeforePx = 10;
+constexpr float kFlat = 0.98F, kBeforePx = 13;
 /// Cosine between the direction across an edge and the ray back, above which the face behind a right-angled edge is in
 /// view: the measurement goes on there, and ends at no fixed place.
 constexpr float kTowards = 0.15F;

@@ -54,9 +54,11 @@ TEST(SurfaceEdges, HaveTheWidthOfAPixelOnAnObliqueSurface) {
 
 TEST(SurfaceEdges, AreNotWhereARoundSurfaceBendsAway) {
   EXPECT_THAT(edges_of(eroded_shot_of(smooth_ball, rig_from_object(0), kSigmaMm, 1)), testing::IsEmpty());
-  const auto handle = [](const Eigen::Vector3f& at) { return rod(at, {0, -30, 0}, {0, 30, 0}, 8); };
-  EXPECT_THAT(edges_of(eroded_shot_of(handle, rig_from_object(0), kSigmaMm, 1)).size(),
-              testing::Lt(9));  // of some 90 cells
+  for (const float radius_mm : {5.0F, 8.0F, 15.0F, 25.0F, 40.0F}) {
+    const auto bar = [&](const Eigen::Vector3f& at) { return rod(at, {0, -20, 0}, {0, 20, 0}, radius_mm); };
+    EXPECT_LT(edges_of(eroded_shot_of(bar, rig_from_object(0), kSigmaMm, 1)).size(), 9)
+        << radius_mm;  // of some 60 to 120
+  }
 }
 
 TEST(SurfaceEdges, AreNotWhereTheViewEnds) {
@@ -130,6 +132,22 @@ TEST(Align, NoiseOfTheNormalsIsNoRelief) {
 RigidTransform turning(std::size_t frame) {
   const double number = static_cast<double>(frame);
   return rig_from_object(10 * number, 2 * std::sin(number), {2 * std::cos(number), std::sin(2 * number), 0});
+}
+
+TEST(Align, ASlabSeenObliquelyIsNotCertainEnough) {
+  // Its upright edges are too oblique to be used, and the others hold it in one direction alone.
+  const RigidTransform before = rig_from_object(66), now = rig_from_object(70, 0, {2, 0, 0});
+  const Shot reference = eroded_shot_of(plate, before, 0.4F, 1), shot = eroded_shot_of(plate, now, 0.4F, 2);
+  const PlacedShot placed{&reference, {}};
+  const auto found = align(shot, {&placed, 1}, {});
+  EXPECT_TRUE(!found || !refusal_of(*found).empty());
+  const Shot front = eroded_shot_of(plate, rig_from_object(0), 0.4F, 1),
+             next = eroded_shot_of(plate, rig_from_object(4), 0.4F, 2);
+  const PlacedShot placed_front{&front, {}};
+  const auto held = align(next, {&placed_front, 1}, {});
+  ASSERT_TRUE(held.has_value());
+  EXPECT_EQ(refusal_of(*held), "");
+  EXPECT_LT(held->uncertain_px, 2);
 }
 
 TEST(Tracker, FollowsThinPlatesAllTheWayRound) {
