@@ -40,7 +40,7 @@ constexpr double kMostUncertainPx = 2.4;
 constexpr double kErrorsAlike = 3;
 constexpr double kLeastInformation = 1e-6;
 
-/// What a pixel of the first camera sees at the shot's middle.
+/// Width of a pixel of the first camera at the shot's middle, mm.
 double pixel_mm(const Shot& shot) {
   const RangeImage& image = shot.views.front().image;
   return (image.camera_from_rig * shot.middle_mm()).z() / image.lens.fx;
