@@ -81,10 +81,8 @@ RigidTransform Tracker::expected() const {
 
 std::vector<PlacedShot> Tracker::latest_keyframes() const {
   std::vector<PlacedShot> latest;
-  for (std::size_t i = keyframes_.size() - std::min(kLatest, keyframes_.size()); i < keyframes_.size(); ++i) {
-    const ModelFrame& frame = frames_[keyframes_[i]];
-    latest.push_back({&frame.shot, frame.object_from_rig});
-  }
+  for (std::size_t i = keyframes_.size() - std::min(kLatest, keyframes_.size()); i < keyframes_.size(); ++i)
+    latest.push_back(frames_[keyframes_[i]].placed());
   return latest;
 }
 
@@ -112,7 +110,7 @@ std::optional<Alignment> Tracker::search(std::size_t number, const Shot& shot) c
   std::optional<Alignment> best;
   for (const std::size_t keyframe : keyframes_) {
     const ModelFrame& known = frames_[keyframe];
-    const PlacedShot reference{&known.shot, known.object_from_rig};
+    const PlacedShot reference = known.placed();
     // Where the shots' middles meet.
     RigidTransform start = known.object_from_rig;
     start.translation += start.rotation * (known.shot.middle_mm() - shot.middle_mm());
@@ -127,7 +125,7 @@ std::optional<Alignment> Tracker::search(std::size_t number, const Shot& shot) c
 std::optional<Alignment> Tracker::step(const Shot& shot) const {
   std::optional<Alignment> best;
   const ModelFrame& last = frames_.back();
-  const PlacedShot reference{&last.shot, last.object_from_rig};
+  const PlacedShot reference = last.placed();
   const Eigen::Vector3d middle = last.shot.middle_mm();
   for (const int axis : {1, 0, 2}) {
     for (const double degrees : {step_degrees_, -step_degrees_}) {
@@ -154,7 +152,7 @@ Tracked Tracker::begin(const Shot& shot) const {
 bool Tracker::is_of_two(const Shot& shot, const RigidTransform& object_from_rig, bool refused) const {
   const auto shows_since = [&](const ModelFrame& before) {
     const std::array starts{before.object_from_rig, expected(), object_from_rig};
-    return shows_two_bodies({&shot, object_from_rig}, {&before.shot, before.object_from_rig}, starts);
+    return shows_two_bodies({&shot, object_from_rig}, before.placed(), starts);
   };
   const ModelFrame& before = doubtful_ ? *doubtful_ : frames_.back();
   if (shows_since(before)) return true;
@@ -222,12 +220,11 @@ Tracked Tracker::add(std::size_t number, Shot shot) {
 }
 
 void Tracker::add_keyframe() {
-  const ModelFrame& latest = frames_.back();
-  const PlacedShot placed{&latest.shot, latest.object_from_rig};
-  ShotEvidence evidence = no_evidence(latest.shot);
+  const PlacedShot placed = frames_.back().placed();
+  ShotEvidence evidence = no_evidence(*placed.shot);
   for (std::size_t i = 0; i < keyframes_.size(); ++i) {
     ModelFrame& before = frames_[keyframes_[i]];
-    const PlacedShot other{&before.shot, before.object_from_rig};
+    const PlacedShot other = before.placed();
     weigh(evidence_[i], other, placed);
     weigh(evidence, placed, other);
     mark_foreign(before.shot, evidence_[i]);
@@ -241,12 +238,12 @@ void Tracker::mark_foreign_cells() {
   const auto witnesses_of = [&](std::size_t frame) {
     std::vector<PlacedShot> witnesses;
     for (const std::size_t keyframe : keyframes_)
-      if (keyframe != frame) witnesses.push_back({&frames_[keyframe].shot, frames_[keyframe].object_from_rig});
+      if (keyframe != frame) witnesses.push_back(frames_[keyframe].placed());
     return witnesses;
   };
   std::vector<ShotEvidence> evidence(frames_.size());
   tbb::parallel_for(std::size_t{0}, frames_.size(), [&](std::size_t i) {
-    const PlacedShot placed{&frames_[i].shot, frames_[i].object_from_rig};
+    const PlacedShot placed = frames_[i].placed();
     evidence[i] = no_evidence(*placed.shot);
     for (const PlacedShot& witness : witnesses_of(i)) weigh(evidence[i], placed, witness);
   });
@@ -257,8 +254,7 @@ void Tracker::mark_foreign_cells() {
   for (int round = 0; round < kRounds; ++round) {
     std::vector<std::vector<std::vector<std::size_t>>> grown(marked.size());
     tbb::parallel_for(std::size_t{0}, marked.size(), [&](std::size_t i) {
-      const ModelFrame& frame = frames_[marked[i]];
-      grown[i] = grown_foreign({&frame.shot, frame.object_from_rig}, witnesses_of(marked[i]));
+      grown[i] = grown_foreign(frames_[marked[i]].placed(), witnesses_of(marked[i]));
     });
     for (std::size_t i = 0; i < marked.size(); ++i) {
       Shot& shot = frames_[marked[i]].shot;

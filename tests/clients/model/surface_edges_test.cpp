@@ -23,7 +23,7 @@ const std::vector<SurfaceEdge>& edges_of(const Shot& shot) {
   return shot.views[0].edges.edges;
 }
 
-/// How far a place is inside of the front of the plate, from its nearest side.
+/// Distance of a place on the front of the plate from its nearest side; negative outside.
 float inside_mm(const Eigen::Vector3f& in_rig) {
   const Eigen::Vector3f at = in_rig - kMiddle.cast<float>();
   return std::min(kPlateHalfMm.x() - std::abs(at.x()), kPlateHalfMm.y() - std::abs(at.y()));
