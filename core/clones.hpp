@@ -66,4 +66,26 @@ struct Cloned<kBody> {
 #endif
 };
 
+/// A loop whose results are the same on every processor, to the last bit: no clone fuses products.
+/// @param kWide, kNarrow  the loop in vectors of eight, for processors with AVX2, and in vectors of four
+template <auto kWide, auto kNarrow>
+struct ClonedExactly;
+
+template <class... Parameters, void (*kWide)(Parameters...), void (*kNarrow)(Parameters...)>
+struct ClonedExactly<kWide, kNarrow> {
+  static void call(Parameters... parameters) {
+#if defined(__x86_64__)
+    if (clone_in_use.load(std::memory_order_relaxed) != Clone::kPlain) return avx2(parameters...);
+#endif
+    kNarrow(parameters...);
+  }
+
+#if defined(__x86_64__)
+ private:
+  __attribute__((noinline, target("avx2,bmi,bmi2,popcnt"))) static void avx2(Parameters... parameters) {
+    kWide(parameters...);
+  }
+#endif
+};
+
 }  // namespace slsd

@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
+
+#include "core/clones.hpp"
+#include "core/lanes.hpp"
 
 namespace slsd {
 namespace {
@@ -17,7 +21,7 @@ struct Weights {
   std::vector<float> value, slope;
 };
 
-Weights weights_of(float phase_px, float sigma_px, int reach) {
+Weights weights_of(float phase_px, float sigma_px, int reach, float full) {
   Weights weights;
   const auto share_below = [&](float edge) {
     return 0.5F * std::erfc(-(edge - phase_px) / (sigma_px * std::numbers::sqrt2_v<float>));
@@ -28,58 +32,114 @@ Weights weights_of(float phase_px, float sigma_px, int reach) {
   };
   for (int k = -reach; k <= reach; ++k) {
     const float left = static_cast<float>(k) - 0.5F, right = static_cast<float>(k) + 0.5F;
-    weights.value.push_back(share_below(right) - share_below(left));
-    weights.slope.push_back(density(left) - density(right));
+    weights.value.push_back((share_below(right) - share_below(left)) / full);
+    weights.slope.push_back((density(left) - density(right)) / full);
   }
   return weights;
 }
 
-/// The nearest whole number, halves away from zero: std::lround(), but in vectors.
-int rounded(float number) {
-  const int whole = static_cast<int>(number);
-  const float rest = number - static_cast<float>(whole);
-  return whole + (rest >= 0.5F ? 1 : 0) - (rest <= -0.5F ? 1 : 0);
+/// Numbers computed at once: eight or four.
+template <class Reals, class Integers>
+struct Vectors {
+  static constexpr int kCount = sizeof(Reals) / sizeof(float);
+
+  static inline __attribute__((always_inline)) void load(const float* from, Reals& to) {
+    std::memcpy(&to, from, sizeof to);
+  }
+
+  /// Rounds to the nearest whole number, halves away from zero.
+  static inline __attribute__((always_inline)) void round(const Reals& from, int least, int most, Integers& to) {
+    const Reals half = Reals{} + 0.5F;
+    to = __builtin_convertvector(from, Integers);
+    const Reals rest = from - __builtin_convertvector(to, Reals);
+    to += (rest <= -half) - (rest >= half);  // a comparison that holds is -1
+    const Integers low = Integers{} + least, high = Integers{} + most;
+    to = to < low ? low : to;
+    to = to > high ? high : to;
+  }
+
+  /// Stores the lanes of both in turn: one lane of the first, one of the second.
+  static inline __attribute__((always_inline)) void store_in_turn(const Integers& first, const Integers& second,
+                                                                  int count, std::uint32_t* to) {
+    Integers both[2];
+    if constexpr (kCount == kLanes) {
+      both[0] = __builtin_shufflevector(first, second, 0, 8, 1, 9, 2, 10, 3, 11);
+      both[1] = __builtin_shufflevector(first, second, 4, 12, 5, 13, 6, 14, 7, 15);
+    } else {
+      both[0] = __builtin_shufflevector(first, second, 0, 4, 1, 5);
+      both[1] = __builtin_shufflevector(first, second, 2, 6, 3, 7);
+    }
+    std::memcpy(to, both, 2 * static_cast<std::size_t>(count) * sizeof *to);
+  }
+};
+/// A row of the pattern, weighted along the columns, and what its samples take from it.
+struct SampledRow {
+  const float *down, *down_slope;  // from `reach` pixels before the row; kLanes more may be read
+  const float *value[kPhases], *slope[kPhases];
+  int taps, pixels;
+  float per_slope_unit;
+  std::uint32_t* to;  // kPhases samples for each pixel
+};
+
+template <class Reals>
+struct Sampled {
+  Reals value, slope_u, slope_v;
+};
+
+template <class Reals, class Integers>
+inline __attribute__((always_inline)) void pack(const Sampled<Reals>& from, float per_slope_unit, Integers& bits) {
+  using Vector = Vectors<Reals, Integers>;
+  Integers level, u, v;
+  Vector::round(from.value / PatternField::kValueUnit, 0, 1023, level);
+  Vector::round(from.slope_u * per_slope_unit, -kSlopeMax, kSlopeMax, u);
+  Vector::round(from.slope_v * per_slope_unit, -kSlopeMax, kSlopeMax, v);
+  constexpr int kSlopeMask = (1 << PatternField::kSlopeBits) - 1;
+  bits = level << (2 * PatternField::kSlopeBits) | (u & kSlopeMask) << PatternField::kSlopeBits | (v & kSlopeMask);
 }
 
-std::uint32_t packed(float value, float slope_u, float slope_v, float per_slope_unit) {
-  const auto bits = [&](float slope) {
-    const int steps = std::clamp(rounded(slope * per_slope_unit), -kSlopeMax, kSlopeMax);
-    return static_cast<std::uint32_t>(steps) & ((1U << PatternField::kSlopeBits) - 1);
-  };
-  const auto level = static_cast<std::uint32_t>(std::clamp(rounded(value / PatternField::kValueUnit), 0, 1023));
-  return level << (2 * PatternField::kSlopeBits) | bits(slope_u) << PatternField::kSlopeBits | bits(slope_v);
-}
-
-/// The samples of a row at one phase: next to each other, so that they are computed in vectors.
-class RowOfPhase {
- public:
-  explicit RowOfPhase(int pixels) : value_(pixels), slope_u_(pixels), slope_v_(pixels) {}
-
-  /// @param down, down_slope  weighted along the columns, from `reach` pixels before the row
-  void weigh(const float* down, const float* down_slope, const Weights& across) {
-    for (auto* sums : {&value_, &slope_u_, &slope_v_}) std::ranges::fill(*sums, 0.F);
-    for (std::size_t k = 0; k < across.value.size(); ++k) {
-      const float weight = across.value[k], slope = across.slope[k];
-      const float *const from = down + k, *const from_slope = down_slope + k;
-      float *const value = value_.data(), *const slope_u = slope_u_.data(), *const slope_v = slope_v_.data();
-#pragma omp simd
-      for (std::size_t x = 0; x < value_.size(); ++x) {
-        value[x] += weight * from[x];
-        slope_u[x] += slope * from[x];
-        slope_v[x] += weight * from_slope[x];
+template <class Reals, class Integers>
+inline __attribute__((always_inline)) void sample_row(const SampledRow& in) {
+  static_assert(kPhases == 2);
+  using Vector = Vectors<Reals, Integers>;
+  for (int x = 0; x < in.pixels; x += Vector::kCount) {
+    Sampled<Reals> sampled[kPhases]{};
+    for (int k = 0; k < in.taps; ++k) {
+      Reals down, down_slope;
+      Vector::load(in.down + x + k, down), Vector::load(in.down_slope + x + k, down_slope);
+      for (int phase = 0; phase < kPhases; ++phase) {
+        const float weight = in.value[phase][k];
+        sampled[phase].value += weight * down, sampled[phase].slope_u += in.slope[phase][k] * down;
+        sampled[phase].slope_v += weight * down_slope;
       }
     }
+    Integers first, second;
+    pack(sampled[0], in.per_slope_unit, first), pack(sampled[1], in.per_slope_unit, second);
+    Vector::store_in_turn(first, second, std::min(Vector::kCount, in.pixels - x),
+                          in.to + static_cast<std::ptrdiff_t>(x) * kPhases);
   }
+}
 
-  /// @param to  every kPhases-th of these
-  void pack(float per_slope_unit, std::uint32_t* to) const {
-    for (std::size_t x = 0; x < value_.size(); ++x)
-      to[x * kPhases] = packed(value_[x], slope_u_[x], slope_v_[x], per_slope_unit);
-  }
-
- private:
-  std::vector<float> value_, slope_u_, slope_v_;
+/// Rows of the pattern, weighted for a row of samples.
+struct WeighedRows {
+  const float* rows;  // the first
+  std::size_t pitch;  // a multiple of kLanes
+  const float *value, *slope;
+  int taps;
+  float *to, *to_slope;
 };
+template <class Reals, class Integers>
+inline __attribute__((always_inline)) void weigh_rows(const WeighedRows& in) {
+  using Vector = Vectors<Reals, Integers>;
+  for (std::size_t x = 0; x < in.pitch; x += Vector::kCount) {
+    Reals value{}, slope{};
+    for (int k = 0; k < in.taps; ++k) {
+      Reals levels;
+      Vector::load(in.rows + k * in.pitch + x, levels);
+      value += in.value[k] * levels, slope += in.slope[k] * levels;
+    }
+    std::memcpy(in.to + x, &value, sizeof value), std::memcpy(in.to_slope + x, &slope, sizeof slope);
+  }
+}
 
 }  // namespace
 
@@ -89,34 +149,31 @@ PatternField::PatternField(const ImageView<std::uint8_t>& pattern, float blur_si
       blur_sigma_px_(blur_sigma_px),
       // No slope of a blurred function between 0 and 1 exceeds the Gaussian's peak.
       slope_unit_(1 / (blur_sigma_px * std::sqrt(2 * std::numbers::pi_v<float>) * kSlopeMax)),
-      samples_(static_cast<std::size_t>(width_) * height_) {
+      samples_(std::make_unique_for_overwrite<std::uint32_t[]>(static_cast<std::size_t>(width_) * height_)) {
   const int reach = static_cast<int>(std::ceil(3.5F * blur_sigma_px + 0.5F)), wide = pattern.width + 2 * kBorderPx;
-  std::vector<Weights> weights;
-  for (int phase = 0; phase < kPhases; ++phase)
-    weights.push_back(weights_of(static_cast<float>(phase) / kPhases, blur_sigma_px, reach));
+  std::vector<Weights> weights;  // along the rows, then along the columns of grey levels
+  for (const float full : {1.F, 255.F})
+    for (int phase = 0; phase < kPhases; ++phase)
+      weights.push_back(weights_of(static_cast<float>(phase) / kPhases, blur_sigma_px, reach, full));
+  // The pattern with a dark border, as far as any sample's weights reach.
+  const std::size_t pitch = (static_cast<std::size_t>(wide) + 2 * reach + 2 * kLanes) / kLanes * kLanes;
+  const int high = pattern.height + 2 * kBorderPx + 2 * reach, border = kBorderPx + reach;
+  std::vector<float> dark(pitch * high, 0);
+  for (int y = 0; y < pattern.height; ++y)
+    std::copy_n(pattern.row(y), pattern.width, dark.data() + (y + border) * pitch + border);
   // Along the columns first, at the pattern's width; then along the rows.
-  const std::size_t padded = static_cast<std::size_t>(wide) + 2 * reach;
-  std::vector<float> down(padded), down_slope(padded);
-  RowOfPhase samples(wide);
+  std::vector<float> down(pitch), down_slope(pitch);
+  SampledRow row{down.data(), down_slope.data(), {}, {}, 2 * reach + 1, wide, 1 / slope_unit_, nullptr};
+  for (int phase = 0; phase < kPhases; ++phase)
+    row.value[phase] = weights[phase].value.data(), row.slope[phase] = weights[phase].slope.data();
+  const Weights* const along = weights.data() + kPhases;
   for (int j = 0; j < height_; ++j) {
-    const int middle = j / kPhases - kBorderPx;
-    const Weights& w = weights[j % kPhases];
-    std::fill(down.begin(), down.end(), 0.F);
-    std::fill(down_slope.begin(), down_slope.end(), 0.F);
-    for (int k = -reach; k <= reach; ++k) {
-      if (middle + k < 0 || middle + k >= pattern.height) continue;
-      const std::uint8_t* row = pattern.row(middle + k);
-      const float value = w.value[k + reach] / 255, slope = w.slope[k + reach] / 255;
-      float *const to = down.data() + reach + kBorderPx, *const to_slope = down_slope.data() + reach + kBorderPx;
-      for (int x = 0; x < pattern.width; ++x) {
-        to[x] += value * static_cast<float>(row[x]);
-        to_slope[x] += slope * static_cast<float>(row[x]);
-      }
-    }
-    for (int phase = 0; phase < kPhases; ++phase) {
-      samples.weigh(down.data(), down_slope.data(), weights[phase]);
-      samples.pack(1 / slope_unit_, &samples_[static_cast<std::size_t>(j) * width_ + phase]);
-    }
+    const Weights& w = along[j % kPhases];
+    ClonedExactly<weigh_rows<Lanes, IntLanes>, weigh_rows<FourLanes, FourIntLanes>>::call(
+        {dark.data() + (j / kPhases) * pitch, pitch, w.value.data(), w.slope.data(), row.taps, down.data(),
+         down_slope.data()});
+    row.to = samples_.get() + static_cast<std::ptrdiff_t>(j) * width_;
+    ClonedExactly<sample_row<Lanes, IntLanes>, sample_row<FourLanes, FourIntLanes>>::call(row);
   }
 }
 

@@ -55,7 +55,7 @@ class PatternField {
   }
 
   /// A sample: 10 bits of the value, 11 of each slope.
-  [[nodiscard]] const std::uint32_t* samples() const { return samples_.data(); }
+  [[nodiscard]] const std::uint32_t* samples() const { return samples_.get(); }
   [[nodiscard]] int width() const { return width_; }  ///< samples
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] float slope_unit() const { return slope_unit_; }  ///< per projector px, of one step of a slope's bits
@@ -67,7 +67,7 @@ class PatternField {
  private:
   int width_, height_;
   float blur_sigma_px_, slope_unit_;
-  std::vector<std::uint32_t> samples_;
+  std::unique_ptr<std::uint32_t[]> samples_;
 };
 
 /// The pattern at any blur. Makes each field on first use: a ladder of blurs that stay, and between them those that

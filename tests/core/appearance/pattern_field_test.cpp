@@ -2,9 +2,12 @@
 // Copyright the slsd authors
 #include "core/appearance/pattern_field.hpp"
 
+#include <algorithm>
+
 #include <gmock/gmock.h>
 #include <rapidcheck/gtest.h>
 
+#include "core/clones.hpp"
 #include "tests/core/appearance/plain_light.hpp"
 
 namespace slsd {
@@ -52,6 +55,19 @@ TEST(PatternFields, FindsTheNearestBlur) {
   EXPECT_EQ(fields.nearest(0.8F).blur_sigma_px(), 0.72F);
   EXPECT_EQ(fields.nearest(0.9F).blur_sigma_px(), 0.95F);
   EXPECT_EQ(&fields.nearest(0.9F), &fields.rung(3)) << "made once";
+}
+
+TEST(PatternField, IsTheSameOnEveryProcessor) {
+  const Grey8 pattern = blocks();
+  const Clone usual = clone_in_use.exchange(Clone::kPlain);
+  const PatternField plain(pattern.view(), 0.6F);
+  for (const Clone clone : clones_here()) {
+    clone_in_use = clone;
+    const PatternField field(pattern.view(), 0.6F);
+    const std::size_t count = static_cast<std::size_t>(field.width()) * field.height();
+    EXPECT_TRUE(std::equal(field.samples(), field.samples() + count, plain.samples())) << static_cast<int>(clone);
+  }
+  clone_in_use = usual;
 }
 
 TEST(PatternField, IsDarkFarOutside) {
