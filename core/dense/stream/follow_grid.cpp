@@ -27,6 +27,10 @@ constexpr float kGainChange = 0.1F;
 constexpr float kSeenMin = 4;
 /// Smallest share of a frame's nodes that continue; with fewer, the next frame starts afresh.
 constexpr double kFollowedMin = 0.5;
+/// One row of blocks in so many is followed first. If fewer nodes of it continue than this share, the scene moves, and
+/// the others do not continue either.
+constexpr int kSampledBlocks = 4;
+constexpr double kSampledMin = 0.5 * kFollowedMin;
 /// Excess of still nodes over continued ones above which a new frame is kept, which itself takes time.
 constexpr double kStillMore = 0.2;
 /// Interval at which windows are sampled to count still nodes.
@@ -121,6 +125,11 @@ inline __attribute__((always_inline)) void find_move(const float* columns, int s
   to.left = to.squares - taken;
 }
 
+/// Tells whether a row of nodes is in a sampled row of blocks.
+bool is_sampled(int row) {
+  return row / kBlockNodes % kSampledBlocks == 0;
+}
+
 void copy_levels(const GreyView& frame, std::vector<std::uint16_t>& to) {
   std::visit(
       [&](const auto& pixels) {
@@ -191,7 +200,9 @@ void GridFollower::follow_row(const DenseFrame& frame, const FollowedFrame& from
 }
 
 /// Gives up blocks whose planes move together, and counts the rest.
-void GridFollower::stop_what_moves(SurfaceGrid& grid) {
+/// @param sampled  whether to do so in the sampled rows of blocks, or in all others
+/// @return the sum of their moves across the epipolar lines
+float GridFollower::stop_what_moves(SurfaceGrid& grid, bool sampled) {
   float across = 0;
   const auto each = [&](int top, int left, const auto& take) {
     for (int row = top; row < std::min(top + kBlockNodes, grid.rows()); ++row)
@@ -199,6 +210,7 @@ void GridFollower::stop_what_moves(SurfaceGrid& grid) {
         take(static_cast<std::size_t>(row) * grid.columns() + column);
   };
   for (int top = 0; top < grid.rows(); top += kBlockNodes) {
+    if (is_sampled(top) != sampled) continue;
     for (int left = 0; left < grid.columns(); left += kBlockNodes) {
       float moved = 0, by_noise = 0, off = 0;
       std::size_t good = 0;
@@ -213,7 +225,7 @@ void GridFollower::stop_what_moves(SurfaceGrid& grid) {
       }
     }
   }
-  across_px_ = across / static_cast<float>(std::max<std::size_t>(1, followed_));
+  return across;
 }
 
 float GridFollower::tone_power() const {
@@ -237,9 +249,18 @@ std::shared_ptr<const FollowedFrame> GridFollower::follow(const DenseFrame& fram
     return nullptr;
   columns_.resize(std::max(columns_.size(), static_cast<std::size_t>(executor.workers())));
   moves_.assign(from->nodes.size(), {});
-  executor.run(grid.rows(), [&](int row, int worker) { follow_row(frame, *from, grid, row, worker); });
-  stop_what_moves(grid);
-  if (static_cast<double>(followed_) >= kFollowedMin * static_cast<double>(from->good)) return from;
+  float across = 0;
+  const auto follow_rows = [&](bool sampled, double share, std::size_t of) {
+    executor.run(grid.rows(), [&](int row, int worker) {
+      if (is_sampled(row) == sampled) follow_row(frame, *from, grid, row, worker);
+    });
+    across += stop_what_moves(grid, sampled);
+    return static_cast<double>(followed_) >= share * static_cast<double>(of);
+  };
+  if (follow_rows(true, kSampledMin, from->good_sampled) && follow_rows(false, kFollowedMin, from->good)) {
+    across_px_ = across / static_cast<float>(std::max<std::size_t>(1, followed_));
+    return from;
+  }
   grid.clear();
   followed_ = 0, across_px_ = 0;
   return nullptr;
@@ -309,6 +330,7 @@ void GridFollower::finish(const DenseMap& map, const SurfaceGrid& grid) {
       kept_->tried[index] = !node.good;
       node.good = node.good && map.measured(static_cast<std::size_t>(grid.y_of(row)) * map.width + grid.x_of(column));
       kept_->good += node.good;
+      if (is_sampled(row)) kept_->good_sampled += node.good;
     }
   }
   const std::lock_guard lock(shared_->mutex);

@@ -74,7 +74,7 @@ class GridFollower {
     float square = 0, by_noise = 0;  // square of a plane's move, and its expectation from noise
     float across_px = 0;             // off the epipolar line
   };
-  void stop_what_moves(SurfaceGrid& grid);
+  float stop_what_moves(SurfaceGrid& grid, bool sampled);
   void follow_row(const DenseFrame& frame, const FollowedFrame& from, SurfaceGrid& grid, int row, int worker);
   [[nodiscard]] double still_share(const DenseFrame& frame, const SurfaceGrid& grid) const;
 

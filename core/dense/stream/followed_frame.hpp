@@ -23,7 +23,7 @@ struct FollowedFrame {
   EpipolarOffset epipolar;
   std::vector<SurfaceNode> nodes;                  ///< good if they gave points
   std::vector<char> tried;                         ///< nodes that no plane fitted
-  std::size_t good = 0;                            ///< number of good nodes
+  std::size_t good = 0, good_sampled = 0;          ///< numbers of good nodes: all, and in the sampled rows
   std::vector<SurfaceSeed> found;                  ///< see SurfaceSearch
   std::vector<std::int16_t> along, across, light;  ///< for each pixel: the derivatives of the light, and the light
   float slope_unit = 0;                            ///< slope of one unit of the derivatives
