@@ -200,15 +200,29 @@ inline __attribute__((always_inline)) void sum_squares(const float* middle, std:
   std::memcpy(to, &sum, sizeof sum);
 }
 
+/// Sizes of the data of all nodes: one quantity after the other, with a border of nodes that are not good.
+struct Planes {
+  std::size_t row, plane;
+  Planes(int columns, int rows)
+      : row(static_cast<std::size_t>(columns) + 2 * kFuseReach + kLanes),
+        plane(row * (static_cast<std::size_t>(rows) + 2 * kFuseReach)) {}
+  [[nodiscard]] std::size_t place(int at_row, int column, int what) const {
+    return what * plane + (static_cast<std::size_t>(at_row + kFuseReach)) * row + column + kFuseReach;
+  }
+};
+
 }  // namespace
 
+const float* SurfaceGrid::goods(int row) const {
+  return around_.data() + Planes(columns_, rows_).place(row, 0, kGood);
+}
+
 void SurfaceGrid::fuse(Executor& executor) {
-  // The data of all nodes, one quantity after the other, with a border of nodes that are not good.
-  const std::size_t row = static_cast<std::size_t>(columns_) + 2 * kFuseReach + kLanes,
-                    plane = row * (static_cast<std::size_t>(rows_) + 2 * kFuseReach);
+  const Planes planes(columns_, rows_);
+  const std::size_t row = planes.row, plane = planes.plane;
   if (around_.size() != kNumbers * plane) around_.assign(kNumbers * plane, 0);
   const auto place = [&](int at_row, int column, int what) {
-    return around_.data() + what * plane + (static_cast<std::size_t>(at_row) + kFuseReach) * row + column + kFuseReach;
+    return around_.data() + planes.place(at_row, column, what);
   };
   executor.run(rows_, [&](int at_row, int) {
     const SurfaceNode* nodes = nodes_.data() + static_cast<std::size_t>(at_row) * columns_;

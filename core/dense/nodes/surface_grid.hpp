@@ -184,6 +184,9 @@ class SurfaceGrid {
   /// Fuses each node with its neighbours if they agree within their noise: they are then one smooth surface, and their
   /// mean is more exact than each. Flat surfaces thus get wide windows. A larger difference adds to sigma.
   void fuse(Executor& executor);
+  /// Returns 1 for each good node of a row and 0 for the others, as the last fuse() found them. Rows and columns up to
+  /// kFuseReach beyond the grid have 0.
+  [[nodiscard]] const float* goods(int row) const;
 
  private:
   static constexpr std::size_t kBatchNodes = 64;

@@ -506,6 +506,17 @@ void PixelJudge::judge_cell(Cell& cell, Scratch& scratch) const {
   choose(cell, scratch);
 }
 
+/// Counts the good nodes that may be candidates of each cell of a row, from the one to the left of the first node on.
+void PixelJudge::count_goods(const SurfaceGrid& grid, int row, std::vector<float>& goods) {
+  constexpr int kReach = 1;  // nodes beyond the cell's own, see judge_cell()
+  goods.assign(grid.columns() + 1, 0);
+  for (int y = row - kReach; y <= row + 1 + kReach; ++y) {
+    const float* const good = grid.goods(y);
+    for (int column = -1; column < grid.columns(); ++column)
+      for (int x = column - kReach; x <= column + 1 + kReach; ++x) goods[column + 1] += good[x];
+  }
+}
+
 void PixelJudge::resize(const SurfaceGrid& grid, int workers) {
   const int stride_px = grid.stride_px();
   const int side = stride_px + 2 * options_.reach_px;
@@ -538,10 +549,11 @@ void PixelJudge::judge(const DenseFrame& frame, const BlurredPattern& pattern, c
     if (top >= bottom) return;
     Scratch& scratch = scratch_[worker];
     const std::span<const CellKind> kinds = scratch.blender.blend_row(grid, row, map);
+    count_goods(grid, row, scratch.goods);
     for (int column = -1; column < grid.columns(); ++column) {
       const bool inside = column >= 0 && column + 1 < grid.columns();
       const CellKind kind = inside ? kinds[column] : CellKind::kApart;
-      if (kind == CellKind::kClean) continue;
+      if (kind == CellKind::kClean || scratch.goods[column + 1] == 0) continue;
       Cell cell{frame, pattern, grid, map, column, row, 0, 0, 0, 0};
       cell.left = std::max(0, grid.x_of(column)), cell.top = top;
       cell.right = std::min(map.width, grid.x_of(column) + stride), cell.bottom = bottom;

@@ -49,11 +49,13 @@ class PixelJudge {
   struct Scratch {
     explicit Scratch(CellBlender blends) : blender(std::move(blends)) {}
     CellBlender blender;
+    std::vector<float> goods;  // for each cell of a row: number of good nodes within the reach of candidates
     std::vector<float> seen, evidence, sums, least[kCandidates], own[kCandidates];
     std::vector<SideEvidence> sides[kCandidates];
   };
   struct Cell;
   void resize(const SurfaceGrid& grid, int workers);
+  static void count_goods(const SurfaceGrid& grid, int row, std::vector<float>& goods);
   void review(Cell& cell, Scratch& scratch) const;
   void judge_cell(Cell& cell, Scratch& scratch) const;
   void see(const Cell& cell, Scratch& scratch) const;
