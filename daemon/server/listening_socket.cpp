@@ -172,6 +172,15 @@ Result<> check_socket_path(const path& path) {
   return check_free(path);
 }
 
+Result<> check_can_listen(const path& path) {
+  const auto inherited = handed_over(path);
+  if (!inherited) return tl::unexpected(inherited.error());
+  if (*inherited) return {};
+  const auto locked = lock(folder_of(path));
+  if (!locked) return tl::unexpected(locked.error());
+  return check_socket_path(path);
+}
+
 Result<ListeningSocket> ListeningSocket::open(const path& path, int mode) {
   auto inherited = handed_over(path);
   if (!inherited) return tl::unexpected(inherited.error());

@@ -42,5 +42,7 @@ class ListeningSocket {
 
 /// Checks that a socket can be opened at the path, without opening one. @errors as ListeningSocket::open()
 [[nodiscard]] Result<> check_socket_path(const std::filesystem::path& path);
+/// The same for a service that starts: a socket that systemd hands over for the path is its own.
+[[nodiscard]] Result<> check_can_listen(const std::filesystem::path& path);
 
 }  // namespace slsd

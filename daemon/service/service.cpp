@@ -18,6 +18,7 @@
 #include "daemon/scan/message_ids.hpp"
 #include "daemon/scan/rig/devices.hpp"
 #include "daemon/scan/rig/projected_picture.hpp"
+#include "daemon/server/listening_socket.hpp"
 #include "daemon/server/methods/methods.hpp"
 #include "daemon/server/methods/metrics.hpp"
 #include "daemon/server/methods/status_json.hpp"
@@ -74,6 +75,8 @@ void note_exposures(nlohmann::json& given, const nlohmann::json& next) {
 
 Result<std::unique_ptr<Service>> Service::create(Configuration configuration, const std::filesystem::path& file,
                                                  nlohmann::json settings) {
+  // A second service must not show its picture over that of the first, nor take its cameras.
+  if (auto can = check_can_listen(configuration.server.socket); !can) return tl::unexpected(can.error());
   auto projector = make_projector(configuration.projector);
   if (!projector) return tl::unexpected(projector.error());
   std::vector<std::unique_ptr<Camera>> cameras;

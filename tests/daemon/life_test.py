@@ -110,6 +110,22 @@ class Life(unittest.TestCase):
             with service.client() as client:
                 self.assertIn("version", client.call("status")[0])
 
+    def test_second_service_leaves_the_devices_of_the_first_alone(self):
+        with Service() as service, tempfile.TemporaryDirectory() as folder:
+            other = pathlib.Path(folder) / "other.toml"
+            other.write_text(f"""
+[[camera]]
+name = "camera"
+driver = "file"
+path = "{folder}/nowhere"
+[server]
+socket = "{service.socket}"
+""", encoding="utf-8")
+            second = slsd("--config", other)
+            self.assertEqual(second.returncode, 1)
+            self.assertIn("another service runs here", second.stderr)
+            self.assertNotIn("nowhere", second.stderr)
+
     def test_path_that_is_no_socket_is_left_alone(self):
         service = Service()
         service.socket.write_text("precious", encoding="utf-8")
