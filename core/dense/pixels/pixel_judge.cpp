@@ -125,24 +125,36 @@ struct AroundSums {
 };
 enum AroundRows { kWhole = 0, kUpper = 2, kLower = 4, kRow = 6 };
 
+/// @param kOf  0 for the evidence against another surface, 1 for that against none
+template <int kOf>
+inline __attribute__((always_inline)) void side_lanes(const AroundSums& in, const Evidence& own, Lanes& sides,
+                                                      Lanes& lines) {
+  constexpr int kWholeOf = kWhole + kOf, kUpperOf = kUpper + kOf, kLowerOf = kLower + kOf, kRowOf = kRow + kOf;
+  const Lanes halves = __builtin_shufflevector(in.left, in.right, kWholeOf, 8 + kWholeOf, 0, 0, kUpperOf, 8 + kUpperOf,
+                                               kLowerOf, 8 + kLowerOf);
+  sides = __builtin_shufflevector(halves, in.all, 0, 1, 8 + kUpperOf, 8 + kLowerOf, 4, 5, 6, 7);
+  const Lanes rows = __builtin_shufflevector(in.left, in.right, 0, 0, 0, 0, kRowOf, 8 + kRowOf, kRowOf, 8 + kRowOf);
+  const Lanes of_row =
+      __builtin_shufflevector(rows, in.all, 8 + kRowOf, 8 + kRowOf, 8 + kRowOf, 8 + kRowOf, 4, 5, 6, 7);
+  const Lanes of_column = __builtin_shufflevector(in.column, in.column, kWholeOf, kWholeOf, kWholeOf, kWholeOf,
+                                                  kUpperOf, kUpperOf, kLowerOf, kLowerOf);
+  // The own pixel is in both the row and the column of a corner.
+  const Lanes corners = (of_row + of_column) - (kOf == 0 ? own.against_another : own.against_unlit);
+  const Lanes straight = __builtin_shufflevector(of_column, of_row, 0, 1, 10, 11, 4, 5, 6, 7);
+  lines = __builtin_shufflevector(straight, corners, 0, 1, 2, 3, 12, 13, 14, 15);
+}
+
 inline __attribute__((always_inline)) void split_sides(const AroundSums& in, const Evidence& own, SideEvidence& to) {
-  const auto pair = [](const Lanes& sums, int rows) { return Evidence{sums[rows], sums[rows + 1]}; };
-  to.side = {pair(in.left, kWhole), pair(in.right, kWhole), pair(in.all, kUpper),  pair(in.all, kLower),
-             pair(in.left, kUpper), pair(in.right, kUpper), pair(in.left, kLower), pair(in.right, kLower)};
-  const auto corner = [&](const Lanes& half, int rows) {
-    Evidence line = pair(half, kRow);
-    line += pair(in.column, rows), line -= own;
-    return line;
-  };
-  const Evidence column = pair(in.column, kWhole), row = pair(in.all, kRow);
-  to.line = {column,
-             column,
-             row,
-             row,
-             corner(in.left, kUpper),
-             corner(in.right, kUpper),
-             corner(in.left, kLower),
-             corner(in.right, kLower)};
+  Lanes side, line, side_lit, line_lit;
+  side_lanes<0>(in, own, side, line), side_lanes<1>(in, own, side_lit, line_lit);
+  std::memcpy(to.line.data(), &line, sizeof line);
+  side = side < side_lit ? side : side_lit, line = line < line_lit ? line : line_lit;
+  constexpr Lanes kLeast = {kSideMin, kSideMin, kSideMin, kSideMin, kCornerMin, kCornerMin, kCornerMin, kCornerMin};
+  const Lanes none = Lanes{} - 1;
+  side = ((side >= kLeast) & (line >= Lanes{} + kLineMin)) ? side : none;
+  to.most = -1, to.strength = 0;
+  for (int k = 0; k < kLanes; ++k)
+    if (side[k] > to.strength) to.most = k, to.strength = side[k];
 }
 
 /// Sums of evidence over columns: of the rows around a row, without it, and of that row itself.
@@ -369,15 +381,6 @@ void PixelJudge::weigh(const Cell& cell, const SurfaceNode& node, int candidate,
                           scratch.own[at].data(), enclosed ? nullptr : scratch.sides[at].data());
 }
 
-int SideEvidence::most() const {
-  int best = -1;
-  for (int k = 0; k < kSides; ++k) {
-    if (side[k].least() < (k < kHalves ? kSideMin : kCornerMin) || line[k].least() < kLineMin) continue;
-    if (best < 0 || side[k].least() > side[best].least()) best = k;
-  }
-  return best;
-}
-
 namespace {
 
 /// A plane's claim on a pixel.
@@ -392,7 +395,7 @@ struct Claim {
   }
   /// Tells whether the pixel's own line shows this plane rather than the other.
   [[nodiscard]] bool wins(const Claim& other) const {
-    const auto on_line = [](const Claim& claim, int at) { return claim.evidence->line[at].against_another; };
+    const auto on_line = [](const Claim& claim, int at) { return claim.evidence->line[at]; };
     return std::ranges::all_of(std::array{side, other.side}, [&](int at) {
       return at < 0 || on_line(*this, at) >= on_line(other, at) + kLineMargin;
     });
@@ -425,10 +428,9 @@ int PixelJudge::choose_plane(const Cell& cell, const Scratch& scratch, int x, in
   for (int k = 0; k < cell.count; ++k) {
     const SideEvidence& evidence = scratch.sides[k][at];
     const float around = scratch.least[k][at];
-    const int side = evidence.most();
-    const float strength = around >= kEvidenceMin ? kAround + around : side >= 0 ? evidence.side[side].least() : 0;
-    all[k] = {cell.value(k, static_cast<float>(x), static_cast<float>(y)), cell.candidates[k]->per_px, strength, side,
-              &evidence};
+    const float strength = around >= kEvidenceMin ? kAround + around : evidence.strength;
+    all[k] = {cell.value(k, static_cast<float>(x), static_cast<float>(y)), cell.candidates[k]->per_px, strength,
+              evidence.most, &evidence};
   }
   const std::span claims = std::span(all).first(cell.count);
   int chosen = -1;

@@ -15,14 +15,13 @@
 namespace slsd {
 
 /// Evidence on each side of a pixel: left, right, above, below, and toward the four corners. A surface that ends near
-/// the pixel has evidence on one side alone.
+/// the pixel has evidence on one side alone. A side is that half or quarter of the surroundings, with the pixel's own
+/// line: the pixels along the side's border.
 struct SideEvidence {
   static constexpr int kSides = 8, kHalves = 4;
-  std::array<Evidence, kSides> side;  ///< of that half or quarter of the surroundings, the pixel's own line included
-  std::array<Evidence, kSides> line;  ///< of the own line alone: the pixels along that side's border
-
-  /// The side with the most evidence for the surface; -1 if none has enough.
-  [[nodiscard]] int most() const;
+  std::array<float, kSides> line;  ///< of each own line alone, against another surface
+  float strength;                  ///< the least evidence of the side with the most
+  int most;                        ///< that side; -1 if none has enough
 };
 
 /// Assigns each camera pixel a surface between the grid's nodes. If the nodes are one surface and all pixels agree, it
