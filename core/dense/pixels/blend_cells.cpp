@@ -16,8 +16,8 @@ namespace {
 constexpr float kAgreePx = 0.12F, kAgreeSigmas = 4;
 /// Share of a node's window that agrees, above which the rest counts as noise. Under normal noise it is 0.89 on average
 /// for the weights of AlignOptions::outlier_sigmas = 4, and within 0.04 of that; relief, room light and a webcam's
-/// sharpening leave 0.8. If another surface covers a third of a window, less agrees.
-constexpr float kCleanSupport = 0.75F;
+/// sharpening leave 0.8. If another surface covers a fifth of a window, less agrees.
+constexpr float kCleanSupport = 0.79F;
 
 using ByteLanes [[gnu::vector_size(8)]] = std::uint8_t;
 
