@@ -10,7 +10,7 @@
 #include "core/decode/symbol_reader.hpp"
 #include "core/exposure/divide_light.hpp"
 #include "core/exposure/light_levels.hpp"
-#include "core/geometry/epipolar_limit.hpp"
+#include "core/geometry/epipolar/epipolar_limit.hpp"
 #include "core/geometry/triangulator.hpp"
 #include "core/image_size.hpp"
 

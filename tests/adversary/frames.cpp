@@ -9,7 +9,7 @@
 #include <Eigen/LU>
 #include <opencv2/imgproc.hpp>
 
-#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/epipolar/epipolar_gate.hpp"
 #include "tests/simulator/simulator.hpp"
 
 namespace slsd::adversary {

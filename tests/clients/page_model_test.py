@@ -19,7 +19,7 @@ import numpy as np
 from browser import Browser, is_there
 from impostor import Impostor, result
 from mesh_test import mesh_ply
-from model_test import bumpy_ball, calibration, cloud, coloured, nothing, off_truth_mm, room
+from turning_ball import bumpy_ball, calibration, cloud, coloured, nothing, off_truth_mm, room
 from page_service import Web, downloaded, name_of
 
 from service import BIN, TIMEOUT_S, Service, wait_until

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "core/decode/pattern_reader.hpp"
-#include "core/geometry/epipolar_limit.hpp"
+#include "core/geometry/epipolar/epipolar_limit.hpp"
 
 namespace slsd {
 namespace {

@@ -8,7 +8,7 @@
 #include "core/calibrate/observe/observations.hpp"
 #include "core/calibrate/verify/trueness.hpp"
 #include "core/geometry/calibration.hpp"
-#include "core/geometry/epipolar_limit.hpp"
+#include "core/geometry/epipolar/epipolar_limit.hpp"
 #include "core/result.hpp"
 
 namespace slsd {

@@ -9,7 +9,7 @@
 
 #include "core/cloud/cloud.hpp"
 #include "core/geometry/calibration.hpp"
-#include "core/geometry/epipolar_limit.hpp"
+#include "core/geometry/epipolar/epipolar_limit.hpp"
 
 namespace slsd {
 

@@ -8,7 +8,7 @@
 #include "core/decode/grid/cell_claim.hpp"
 #include "core/decode/grid/cell_rays.hpp"
 #include "core/executor.hpp"
-#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/epipolar/epipolar_gate.hpp"
 
 namespace slsd {
 

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "core/decode/grid/cell_rays.hpp"
-#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/epipolar/epipolar_gate.hpp"
 
 namespace slsd {
 

@@ -13,7 +13,7 @@
 #include "core/decode/grid/sightings.hpp"
 #include "core/decode/lattice.hpp"
 #include "core/executor.hpp"
-#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/epipolar/epipolar_gate.hpp"
 #include "core/geometry/ray_table.hpp"
 
 namespace slsd {

@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 
 #include "core/clones.hpp"
-#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/epipolar/epipolar_gate.hpp"
 #include "core/geometry/ray_table.hpp"
 #include "core/geometry/triangulator.hpp"
 #include "tests/core/geometry/paper_rig.hpp"

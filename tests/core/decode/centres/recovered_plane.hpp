@@ -11,7 +11,7 @@
 
 #include "core/decode/centres/recover_symbols.hpp"
 #include "core/decode/grid/cell_rays.hpp"
-#include "core/geometry/epipolar_gate.hpp"
+#include "core/geometry/epipolar/epipolar_gate.hpp"
 #include "tests/core/decode/decoded_scene.hpp"
 #include "tests/core/decode/shipped_pattern.hpp"
 
