@@ -1,12 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""No include runs upward. The libraries that a room links refuse what is compiled; headers alone are seen only here."""
+"""No include runs upward, and no room is too full.
+
+The libraries that a room links refuse what is compiled; headers alone are seen only here.
+"""
+import collections
 import pathlib
 import re
 import sys
 import unittest
 
+SOURCES_MOST = 24  # in a folder: above that, it has rooms of its own
 SOURCE = pathlib.Path(__file__).resolve().parents[1]
 TOPS = ("core", "picture", "drivers", "rpc", "daemon", "clients", "programs")
 INCLUDE_FOLDERS = (SOURCE, SOURCE / "clients/cpp/include")
@@ -109,9 +114,12 @@ class Rooms(unittest.TestCase):
     def test_every_room_has_its_place(self):
         self.assertEqual({room_of(file) for file in sources()} - {"programs"}, set(BELOW))
 
+    def test_no_room_is_too_full(self):
+        count = collections.Counter(str(file.parent.relative_to(SOURCE)) for file in sources())
+        self.assertEqual({room: number for room, number in count.items() if number > SOURCES_MOST}, {})
+
     def test_no_loop_between_top_rooms(self):
         self.assertEqual(circles(graph_by(lambda file: file.relative_to(SOURCE).parts[0])), [])
-
 
     def test_no_circle_within_a_room(self):
         """A header and the source of its name count as one: both say what the one depends on."""
