@@ -36,7 +36,7 @@ class ClosedGrid {
   [[nodiscard]] bool known(std::size_t node) const { return !std::isnan(points_[node].z()); }
   [[nodiscard]] bool filled(std::size_t node) const { return filled_[node] != 0; }
   /// Tells whether there is a step in depth between two points.
-  [[nodiscard]] bool torn(std::size_t a, std::size_t b) const {
+  [[nodiscard]] bool has_step(std::size_t a, std::size_t b) const {
     const float along = distance(a) - distance(b);
     const float across = std::max(0.0F, (points_[a] - points_[b]).squaredNorm() - along * along);
     return along * along > kSteepest * kSteepest * across;
@@ -62,7 +62,7 @@ class ClosedGrid {
       const std::size_t to = first + static_cast<std::size_t>(i) * step;
       if (!known(to)) continue;
       const std::size_t from = first + static_cast<std::size_t>(std::max(last, 0)) * step;
-      const bool step_in_depth = last >= 0 && i > last + 1 && torn(from, to);
+      const bool step_in_depth = last >= 0 && i > last + 1 && has_step(from, to);
       for (int k = last + 1; last >= 0 && k < i; ++k) {
         const std::size_t node = first + static_cast<std::size_t>(k) * step;
         const float share = static_cast<float>(k - last) / static_cast<float>(i - last);
@@ -182,7 +182,7 @@ void TextureView::add(const MeasuredSurface& surface) {
   const auto join = [&](const std::array<std::size_t, 3>& corners) {
     const auto [a, b, c] = corners;
     if (!grid.known(a) || !grid.known(b) || !grid.known(c)) return;
-    const bool step = grid.torn(a, b) || grid.torn(b, c) || grid.torn(a, c);
+    const bool step = grid.has_step(a, b) || grid.has_step(b, c) || grid.has_step(a, c);
     const bool gap = step || grid.filled(a) || grid.filled(b) || grid.filled(c);
     draw(corner(a), corner(b), corner(c), gap ? gaps : measured_);
     if (!step) return;

@@ -86,8 +86,8 @@ ConfigurationTable decode() {
         "The working range along the camera's axis. A narrower range gives fewer decoding errors."},
        {{{"wrong_cells_max", "0.005", {}, "1e-9", "1"}},
         "How many symbols may get a wrong cell, on average, in a frame made to mislead the decoder, {wrong_cells_max}. "
-        "It sets how certain a symbol must be. A smaller value rejects rims and small parts. docs/decoder.md has "
-        "measurements."},
+        "It sets how certain a symbol must be. A smaller value rejects boundaries and small parts. docs/decoder.md "
+        "has measurements."},
        {{{"precision", R"("standard")"}},
         R"("fine" fits the pattern to each symbol: several times as accurate as "standard", and several times as slow.)"},
        {{{"density", R"("symbols")"}},
