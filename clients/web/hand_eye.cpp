@@ -17,7 +17,7 @@
 
 #include "clients/usage/hand_eye_usage.hpp"
 #include "clients/web/away.hpp"
-#include "clients/web/look_folder.hpp"
+#include "clients/web/view_folder.hpp"
 #include "core/geometry/robot_pose.hpp"
 #include "core/result.hpp"
 #include "drivers/files/file.hpp"
@@ -187,19 +187,19 @@ HandEye::HandEye(path folder, path socket) : folder_(std::move(folder)), socket_
   if (choices.is_object() && fault_of(choices).empty()) choices_ = choices;
 }
 
-json HandEye::look() const {
+json HandEye::state() const {
   const std::lock_guard lock(mutex_);
-  json looks = json::array();
-  for (const KeptLook& kept : looks_in(folder_)) {
-    json look{{"name", kept.name}, {"pose", kept.pose}};
+  json views = json::array();
+  for (const KeptView& kept : views_in(folder_)) {
+    json view{{"name", kept.name}, {"pose", kept.pose}};
     if (const auto seen = seen_.find(kept.name); seen != seen_.end()) {
-      look.update(seen->second);
-      look.erase("cameras");  // their points are for the picture
+      view.update(seen->second);
+      view.erase("cameras");  // their points are for the picture
     }
-    looks.push_back(std::move(look));
+    views.push_back(std::move(view));
   }
   std::error_code ignored;
-  return {{"choices", choices_}, {"looks", std::move(looks)},
+  return {{"choices", choices_}, {"looks", std::move(views)},
           {"outcome", outcome_}, {"error", error_},
           {"busy", busy_},       {"has_file", std::filesystem::exists(file(), ignored)}};
 }
@@ -219,7 +219,7 @@ tl::expected<json, Refusal> HandEye::act(const json& body) {
     busy_ = false;
   }
   if (refused) return tl::unexpected(std::move(*refused));
-  return look();
+  return state();
 }
 
 std::optional<Refusal> HandEye::carry_out(const json& body) {
@@ -254,9 +254,9 @@ std::optional<Refusal> HandEye::take(const json& pose) {
   return run(joined(*numbers));
 }
 
-std::optional<Refusal> HandEye::drop(const json& look) {
-  const std::string name = look.is_string() ? look.get<std::string>() : "";
-  if (const auto erased = erase_look(folder_, name); !erased) {
+std::optional<Refusal> HandEye::drop(const json& view) {
+  const std::string name = view.is_string() ? view.get<std::string>() : "";
+  if (const auto erased = erase_view(folder_, name); !erased) {
     if (erased.error().code == ErrorCode::kNotFound) return Refusal{404, "not_found", to_string(erased.error())};
     return broken(erased.error());
   }
@@ -269,8 +269,8 @@ std::optional<Refusal> HandEye::drop(const json& look) {
 
 std::optional<Refusal> HandEye::clear() {
   remove_result();
-  for (const KeptLook& look : looks_in(folder_)) {
-    if (const auto erased = erase_look(folder_, look.name); !erased) return broken(erased.error());
+  for (const KeptView& view : views_in(folder_)) {
+    if (const auto erased = erase_view(folder_, view.name); !erased) return broken(erased.error());
   }
   const std::lock_guard lock(mutex_);
   seen_.clear();
@@ -278,11 +278,11 @@ std::optional<Refusal> HandEye::clear() {
 }
 
 std::optional<Refusal> HandEye::calculate() {
-  remove_result();  // it belongs to other looks or choices
-  return looks_in(folder_).empty() ? std::nullopt : run("");
+  remove_result();  // it belongs to other views or choices
+  return views_in(folder_).empty() ? std::nullopt : run("");
 }
 
-/// @param pose  of a look to take first; empty: none
+/// @param pose  of a view to take first; empty: none
 std::optional<Refusal> HandEye::run(const std::string& pose) {
   std::vector<std::string> arguments = arguments_of(choices_, folder_, socket_);
   if (!pose.empty()) arguments.push_back("--pose=" + pose);
@@ -320,14 +320,14 @@ void HandEye::remove_result() {
   outcome_ = nullptr;
 }
 
-tl::expected<HandEye::Picture, Refusal> HandEye::picture(const std::string& look, std::string camera) const {
-  const auto cameras = cameras_of_look(folder_, look);
+tl::expected<HandEye::Picture, Refusal> HandEye::picture(const std::string& view, std::string camera) const {
+  const auto cameras = cameras_of_view(folder_, view);
   if (camera.empty() && !cameras.empty()) camera = cameras.front();
-  auto png = picture_of_look(folder_, look, camera);
+  auto png = picture_of_view(folder_, view, camera);
   if (!png) return tl::unexpected(Refusal{404, "not_found", to_string(png.error())});
-  json about{{"look", look}, {"cameras", cameras}, {"camera", camera}, {"points_px", json::array()}};
+  json about{{"look", view}, {"cameras", cameras}, {"camera", camera}, {"points_px", json::array()}};
   const std::lock_guard lock(mutex_);
-  const auto seen = seen_.find(look);
+  const auto seen = seen_.find(view);
   if (seen == seen_.end()) return Picture{std::move(*png), std::move(about)};
   for (const json& each : seen->second.value("cameras", json::array())) {
     if (camera.empty() || each.value("name", "") == camera) about["points_px"] = each["points_px"];

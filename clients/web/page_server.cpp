@@ -143,7 +143,7 @@ PageServer::PageServer(PageOptions options, Token token)
       symbols_(options_.socket, {"symbols", "ply", kSymbolsHz}),
       pixels_(options_.socket, {"pixels", "ply", kPixelsHz}),
       maps_(options_.socket, {"pixels", "pcd", kMapsHz}),
-      hand_eye_(options_.looks, options_.socket),
+      hand_eye_(options_.views, options_.socket),
       model_(options_.model, options_.socket) {
   add_pages();
   add_requests();
@@ -290,7 +290,7 @@ void PageServer::add_requests() {
     return result_or_refusal(call("calibrate", {{"action", "look"}}, kTimeout));
   });
   get("/api/hand_eye", [this](const Request&) { return hand_eye(); });
-  get("/api/hand_eye/look", {"look", "camera"}, [this](const Request& request) { return look(request); });
+  get("/api/hand_eye/look", {"look", "camera"}, [this](const Request& request) { return hand_eye_picture(request); });
   get("/api/hand_eye/file", [this](const Request&) {
     auto text = read_file(hand_eye_.file(), kResultBytesMax);
     if (!text) return refusal(404, "not_found", "there is no result yet: take more views");
@@ -315,9 +315,9 @@ void PageServer::add_requests() {
 }
 
 void PageServer::add_model_requests() {
-  get("/api/model", [this](const Request&) { return json_answer(model_.look()); });
+  get("/api/model", [this](const Request&) { return json_answer(model_.state()); });
   get("/api/model/preview", [this](const Request&) {
-    const json about{{"number", model_.look()["previews"]}};  // before: the points are as new or newer
+    const json about{{"number", model_.state()["previews"]}};  // before: the points are as new or newer
     auto points = model_.preview();
     return points ? cloud_answer(std::move(*points), about) : answer_of(points.error());
   });
@@ -346,7 +346,7 @@ Answer PageServer::take_background() {
                              kTimeout);
   if (!answered) return refusal_of(answered.error());
   if (const auto refused = model_.keep_background(answered->reply.bytes)) return answer_of(*refused);
-  return json_answer(model_.look());
+  return json_answer(model_.state());
 }
 
 tl::expected<Answered, Failure> PageServer::call(const char* method, const json& params,
@@ -434,7 +434,7 @@ Answer PageServer::board(const Request& request) const {
 
 /// The session, and where its result belongs.
 Answer PageServer::hand_eye() const {
-  json told = hand_eye_.look();
+  json told = hand_eye_.state();
   told["file"] = hand_eye_.file().string();
   const auto settings = call("settings", json::object(), kTimeoutOfStatus);
   const auto status = call("status", json::object(), kTimeoutOfStatus);
@@ -451,7 +451,7 @@ Answer PageServer::hand_eye() const {
   return json_answer(told);
 }
 
-Answer PageServer::look(const Request& request) const {
+Answer PageServer::hand_eye_picture(const Request& request) const {
   auto picture = hand_eye_.picture(parameter(request, "look"), parameter(request, "camera"));
   if (!picture) return answer_of(picture.error());
   return {200, "image/png", client::Bytes(std::move(picture->png)), {header_about(picture->about)}, {}};

@@ -38,7 +38,7 @@ struct PageOptions {
   std::filesystem::path token_file = {};                        ///< empty: a random token for this run
   std::filesystem::path three = "/usr/share/javascript/three";  ///< Debian's libjs-three
   std::filesystem::path boards = SLSD_BOARDS;                   ///< boards that are ready to print
-  std::filesystem::path looks = state_folder("hand_eye");       ///< of a hand-eye calibration
+  std::filesystem::path views = state_folder("hand_eye");       ///< of a hand-eye calibration
   std::filesystem::path model = state_folder("model");          ///< clouds and files of the latest model
 };
 
@@ -95,7 +95,7 @@ class PageServer {
   [[nodiscard]] Answer boards() const;
   [[nodiscard]] Answer board(const Request& request) const;
   [[nodiscard]] Answer hand_eye() const;
-  [[nodiscard]] Answer look(const Request& request) const;
+  [[nodiscard]] Answer hand_eye_picture(const Request& request) const;
   [[nodiscard]] Answer cloud(const Request& request);
   [[nodiscard]] Answer scan(const nlohmann::json& body);
   void add_model_requests();

@@ -91,7 +91,7 @@ int main(int argc, char** argv) {
                  "a file with the token to enter; default: a new token for each run");
   app.add_option("--three", options.three, "the folder of three.js; default: that of Debian's libjs-three");
   app.add_option("--boards", options.boards, "the folder of boards to print (" + options.boards.string() + ")");
-  app.add_option("--hand-eye", options.looks, "the folder for the views of a hand-eye calibration");
+  app.add_option("--hand-eye", options.views, "the folder for the views of a hand-eye calibration");
   app.add_option("--model", options.model, "the folder for a model's clouds and files");
   app.add_flag("--address", only_address, "print the address and token of the running page, and exit");
   if (const auto ended = slsd::parse_usage(app, argc, argv)) return *ended;

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 # Copyright the slsd authors
-"""Hand-eye calibration on the page, look by look, against a robot in numpy. SLSD_PICTURES=FOLDER keeps pictures of it."""
+"""Hand-eye calibration on the page, view by view, against a robot in numpy. SLSD_PICTURES=FOLDER keeps pictures of it."""
 import atexit
 import json
 import os
@@ -24,11 +24,11 @@ import hand_eye_test as robot
 from service import BIN, TIMEOUT_S, Service
 
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")
-LOOKS = 8
+VIEWS = 8
 ROBOT_BASE = '\n[frame]\noutput = "robot_base"\nhand_eye = "hand_eye.yml"\n'
 STATE = "document.getElementById('hand-eye-state').textContent"
 VERDICT = "document.getElementById('hand-eye-verdict').textContent"
-ROWS = "document.querySelectorAll('#look-list tbody tr').length"
+ROWS = "document.querySelectorAll('#hand-eye-views tbody tr').length"
 # How many pixels of the first picture have the colour of the board's points.
 GREEN = """
 const canvas = document.querySelector("#hand-eye-pictures canvas");
@@ -44,19 +44,19 @@ class Cell:
     def __init__(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
         atexit.register(shutil.rmtree, self.folder, ignore_errors=True)
-        subprocess.run([BIN / "make_looks", self.folder, str(LOOKS)], check=True, timeout=TIMEOUT_S)
+        subprocess.run([BIN / "make_views", self.folder, str(VIEWS)], check=True, timeout=TIMEOUT_S)
         (self.folder / "nothing").mkdir()
         (self.folder / "nothing/white.pgm").write_bytes(b"P5 800 600 255\n" + bytes(800 * 600))
-        camera_from_board = numpy.loadtxt(self.folder / "looks.csv", delimiter=",").reshape(-1, 4, 4)
+        camera_from_board = numpy.loadtxt(self.folder / "views.csv", delimiter=",").reshape(-1, 4, 4)
         self.poses = [robot.BASE_FROM_BOARD @ numpy.linalg.inv(each) @ numpy.linalg.inv(robot.FLANGE_FROM_RIG)
                       for each in camera_from_board]
 
-    def picture(self, look):
-        return self.folder / ("nothing/white.pgm" if look is None else f"pose_{look:02}/white.png")
+    def picture(self, view):
+        return self.folder / ("nothing/white.pgm" if view is None else f"pose_{view:02}/white.png")
 
-    def text(self, look):
+    def text(self, view):
         text = robot.CONFIGURATION.format(folder=self.folder)
-        return text.replace('"frames"', f'"{self.picture(look)}"').replace("loop = false", "loop = true")
+        return text.replace('"frames"', f'"{self.picture(view)}"').replace("loop = false", "loop = true")
 
 
 def pasted(matrix):
@@ -71,18 +71,18 @@ class HandEye(unittest.TestCase):
 
     def setUp(self):
         self.folder = pathlib.Path(os.environ.get("SLSD_PICTURES") or tempfile.mkdtemp(prefix="slsd-test-"))
-        self.looks = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-")) / "looks of a cell"  # a path to be quoted
-        atexit.register(shutil.rmtree, self.looks.parent, ignore_errors=True)
+        self.views = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-")) / "views of a cell"  # a path to be quoted
+        atexit.register(shutil.rmtree, self.views.parent, ignore_errors=True)
 
-    def see(self, service, look):
+    def see(self, service, view):
         """Another picture is another camera, which a running service does not take."""
-        service.configure(configuration=self.cell.text(look))
+        service.configure(configuration=self.cell.text(view))
         service.stop()
         service.start()
         service.wait_ready()
 
     def kept(self):
-        return {str(each.relative_to(self.looks)): each.read_bytes() for each in self.looks.rglob("*")
+        return {str(each.relative_to(self.views)): each.read_bytes() for each in self.views.rglob("*")
                 if each.is_file() and each.name != "choices.json"}
 
 
@@ -92,7 +92,7 @@ class Operator(HandEye):
         browser.resize(width, height)
         browser.devtools("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
         browser.open(web.address)
-        browser.wait("mayAdminister && !document.getElementById('take-look').disabled", "no look can be taken")
+        browser.wait("mayAdminister && !document.getElementById('take-pose').disabled", "no view can be taken")
         if width < 1100:
             browser.click("nav [data-view=calibrate]")
         browser.run("document.getElementById('hand-eye').open = true;")
@@ -107,16 +107,16 @@ class Operator(HandEye):
 
     def take(self, browser, pose, said="TAKEN", **options):
         self.enter(browser, pose, **options)
-        browser.click("#take-look")
-        browser.wait(f"{STATE}.startsWith('{said}') && !document.getElementById('take-look').disabled", f"not {said}")
+        browser.click("#take-pose")
+        browser.wait(f"{STATE}.startsWith('{said}') && !document.getElementById('take-pose').disabled", f"not {said}")
 
     def picture(self, browser, name, width):
         self.assertLessEqual(browser.run("return document.documentElement.scrollWidth;"), width)
         browser.run("document.getElementById('hand-eye').scrollIntoView();")
         browser.picture(self.folder / f"hand-eye-{name}-{width}.png")
 
-    def test_from_the_first_look_to_clouds_in_the_robots_base(self):
-        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, \
+    def test_from_the_first_view_to_clouds_in_the_robots_base(self):
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.views) as web, \
                 tempfile.TemporaryDirectory() as downloads, Browser(downloads) as browser:
             service.wait_ready()
             self.open(browser, web)
@@ -135,19 +135,19 @@ class Operator(HandEye):
                     self.assertEqual(browser.run("return numbersOfPose(document.getElementById('robot-pose').value);"), told["outcome"]["next_pose"])
             self.assertRegex(browser.run(f"return {VERDICT};"), r"is (good|usable): 95 % of points at \d+ mm are placed within [0-2]\.\d\d mm")
             self.picture(browser, "light", 1600)
-            self.check_place(self.looks / "hand_eye.yml")
+            self.check_place(self.views / "hand_eye.yml")
             browser.click("#hand-eye-save")
-            self.assertEqual(downloaded(downloads, "*.yml")[0].read_bytes(), (self.looks / "hand_eye.yml").read_bytes())
+            self.assertEqual(downloaded(downloads, "*.yml")[0].read_bytes(), (self.views / "hand_eye.yml").read_bytes())
             self.check_same_as_the_command(service)
             self.put_into_force(browser, service)
             self.assertEqual(browser.complaints(expected="50[23]"), [])  # while it was started again
             for width, height, scheme in ((1280, 900, "dark"), (390, 844, "light"), (390, 844, "dark")):
                 self.open(browser, web, width, height, scheme)
-                browser.wait(f"{ROWS} === {LOOKS}", "another browser sees other looks")
-                browser.run("for (const each of document.querySelectorAll('#look-list button')) if (/Show/.test(each.textContent)) { each.click(); break; }")
+                browser.wait(f"{ROWS} === {VIEWS}", "another browser sees other views")
+                browser.run("for (const each of document.querySelectorAll('#hand-eye-views button')) if (/Show/.test(each.textContent)) { each.click(); break; }")
                 browser.wait("document.querySelector('#hand-eye-pictures figcaption')", "no picture")
                 self.picture(browser, scheme, width)
-                browser.run("document.getElementById('look-list').scrollIntoView();")
+                browser.run("document.getElementById('hand-eye-views').scrollIntoView();")
                 browser.picture(self.folder / f"hand-eye-list-{scheme}-{width}.png")
 
     def check_place(self, file):
@@ -159,38 +159,38 @@ class Operator(HandEye):
 
     def check_same_as_the_command(self, service):
         """slsctl hand-eye makes the same file of the same folder."""
-        other = self.looks.parent / "other.yml"
-        done = robot.slsctl("hand-eye", "--mounted", "arm", "--poses", "kuka", "--from", self.looks, "--config", service.file, "-o", other)
+        other = self.views.parent / "other.yml"
+        done = robot.slsctl("hand-eye", "--mounted", "arm", "--poses", "kuka", "--from", self.views, "--config", service.file, "-o", other)
         self.assertEqual(done.returncode, 0, done.stderr)
         undated = [[line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("date:")]
-                   for file in (other, self.looks / "hand_eye.yml")]
+                   for file in (other, self.views / "hand_eye.yml")]
         self.assertEqual(undated[0], undated[1])
 
     def put_into_force(self, browser, service):
         """By the command that the page tells, without sudo."""
         place = service.folder / "hand_eye.yml"
         command = browser.run("return document.getElementById('hand-eye-command').textContent;")
-        self.assertEqual(command, f"sudo install -m 644 '{self.looks}/hand_eye.yml' {place} && sudo kill -HUP {service.process.pid}")
+        self.assertEqual(command, f"sudo install -m 644 '{self.views}/hand_eye.yml' {place} && sudo kill -HUP {service.process.pid}")
         self.assertIn(ROBOT_BASE.split("hand_eye =")[0].strip(), browser.run("return document.getElementById('hand-eye-table').textContent;"))
-        service.configure(configuration=self.cell.text(LOOKS - 1) + ROBOT_BASE)
+        service.configure(configuration=self.cell.text(VIEWS - 1) + ROBOT_BASE)
         with service.client() as client:
             self.assertRaisesRegex(Exception, "hand_eye.yml", client.call, "reload")
         subprocess.run(command.replace("sudo ", ""), shell=True, check=True, capture_output=True)
         browser.wait("document.getElementById('hand-eye-table').hidden", "the page does not see the configuration")
 
-    def test_looks_are_deleted_and_the_rest_calculated_again(self):
-        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+    def test_views_are_deleted_and_the_rest_calculated_again(self):
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.views) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web, 1280, 900)
             for i in range(4):
                 self.see(service, i)
                 self.take(browser, pasted(self.cell.poses[i]))
-            browser.click("[data-look=pose_01] td:last-child button:last-child")
+            browser.click("[data-pose=pose_01] td:last-child button:last-child")
             self.assertEqual(browser.run(f"return {ROWS};"), 4)  # asks first
-            browser.click("[data-look=pose_01] td:last-child button:last-child")
+            browser.click("[data-pose=pose_01] td:last-child button:last-child")
             browser.wait(f"{ROWS} === 3 && {STATE} === ''", "it is not deleted")
-            self.assertFalse((self.looks / "pose_01").exists())
-            self.assertNotIn("pose_01", (self.looks / "poses.csv").read_text(encoding="utf-8"))
+            self.assertFalse((self.views / "pose_01").exists())
+            self.assertNotIn("pose_01", (self.views / "poses.csv").read_text(encoding="utf-8"))
             self.assertEqual(json.loads(web.get("/api/hand_eye")[2])["outcome"]["poses"], 3)
             browser.click("#hand-eye-clear")
             browser.click("#hand-eye-clear")
@@ -201,7 +201,7 @@ class Operator(HandEye):
     def test_a_robtarget_is_read_with_the_text_around_it(self):
         place, turn, more = "[412.5,-231,6.12E+02]", "[0.5,-0.5,0.5,-0.5]", "[0,-1,0,1],[9E+09,9E+09,9E+09,9E+09,9E+09,9E+09]"
         pose = [412.5, -231, 612, 0.5, -0.5, 0.5, -0.5]
-        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.views) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web, 1280, 900)
             browser.wait("handEyePlaced", "the kept choices do not come")
@@ -219,10 +219,10 @@ class Operator(HandEye):
 
     def test_late_choices_of_before_leave_the_users_alone(self):
         """The kept choices come after the user has made some: those stand, the others are placed."""
-        self.looks.mkdir()
+        self.views.mkdir()
         kept = {"mounted": "cell", "poses": "fanuc", "board": "charuco-a3", "distance_mm": 500.0}
-        (self.looks / "choices.json").write_text(json.dumps(kept), encoding="utf-8")
-        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+        (self.views / "choices.json").write_text(json.dumps(kept), encoding="utf-8")
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.views) as web, Browser() as browser:
             service.wait_ready()
             browser.devtools("Page.addScriptToEvaluateOnNewDocument", source="""
                 const soon = window.fetch;
@@ -245,19 +245,19 @@ class Operator(HandEye):
             self.assertIn("KUKA", browser.run("return document.getElementById('notation').selectedOptions[0].textContent;"))
             self.assertIn("on the arm", browser.run("return document.getElementById('mounting-help').textContent;"))
 
-    def test_a_look_of_two_cameras_has_two_pictures(self):
-        folder = self.looks.parent / "of two"
-        subprocess.run([BIN / "make_looks", folder, "3", "2"], check=True, timeout=TIMEOUT_S)
-        rig_from_board = numpy.loadtxt(folder / "looks.csv", delimiter=",").reshape(-1, 4, 4)
+    def test_a_view_of_two_cameras_has_two_pictures(self):
+        folder = self.views.parent / "of two"
+        subprocess.run([BIN / "make_views", folder, "3", "2"], check=True, timeout=TIMEOUT_S)
+        rig_from_board = numpy.loadtxt(folder / "views.csv", delimiter=",").reshape(-1, 4, 4)
         seen = [(folder / f"pose_{i:02}/camera/white.png", folder / f"pose_{i:02}/right/white.png") for i in range(3)]
         seen[2] = (self.cell.picture(None), seen[2][1])
 
-        def text(look):
+        def text(view):
             words = robot.TWO_CAMERAS.format(folder=folder).replace("loop = false", "loop = true")
-            for name, picture in zip(("left", "right"), seen[look]):
+            for name, picture in zip(("left", "right"), seen[view]):
                 words = words.replace(f'path = "{name}"', f'path = "{picture}"')
             return words
-        with Service(configuration=text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+        with Service(configuration=text(0)) as service, Web(service, "--hand-eye", self.views) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web, 1280, 900)
             for i, board in enumerate(rig_from_board):
@@ -272,17 +272,17 @@ class Operator(HandEye):
                     found = not (i == 2 and camera == "camera")
                     self.assertRegex(words, rf"pose_{i:02}, camera {camera}: " + (r"\d\d points of the board" if found else "the board was not found"))
                 self.assertEqual(browser.run(GREEN) > 200, i < 2)
-            look = json.loads(web.get("/api/hand_eye")[2])["looks"]
-            self.assertTrue(look[0]["corners"] > 1.5 * look[2]["corners"])
+            views = json.loads(web.get("/api/hand_eye")[2])["looks"]
+            self.assertTrue(views[0]["corners"] > 1.5 * views[2]["corners"])
             self.picture(browser, "two", 1280)
-            browser.click("[data-look=pose_01] td:last-child button:last-child")
-            browser.click("[data-look=pose_01] td:last-child button:last-child")
+            browser.click("[data-pose=pose_01] td:last-child button:last-child")
+            browser.click("[data-pose=pose_01] td:last-child button:last-child")
             browser.wait(f"{ROWS} === 2 && {STATE} === ''", "it is not deleted")
-            self.assertFalse((self.looks / "pose_01").exists())
+            self.assertFalse((self.views / "pose_01").exists())
 
     def test_bad_input_is_named_and_keeps_nothing(self):
         late = self.cell.poses[3] @ robot.motion(robot.turn((1, 2, 0), 0.06), (25, -12, 8))  # the robot had not arrived
-        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.views) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web, 1280, 900)
             for i in range(2):
@@ -292,7 +292,7 @@ class Operator(HandEye):
             for text, said in (("", "6 numbers"), ("1, 2, nan, 4, 5, 6", "5 numbers instead of 6"), ("412,5; 1,5", "4 numbers instead of 6")):
                 self.enter(browser, text)
                 self.assertTrue(browser.run("return document.getElementById('pose-read').textContent;").startswith(said))
-                browser.click("#take-look")
+                browser.click("#take-pose")
                 browser.wait("/KUKA .* has 6 numbers/.test(document.getElementById('message').textContent)", text)
             self.take(browser, ",".join("1" * 16), notation="matrix", said="")
             browser.wait("/the matrix is no rotation/.test(document.getElementById('message').textContent)", "no word of the matrix")
@@ -316,14 +316,14 @@ class Operator(HandEye):
                              {name: data for name, data in before.items() if name != "hand_eye.yml"})
 
     def test_a_wrong_choice_is_named_as_the_page_has_it(self):
-        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web, Browser() as browser:
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.views) as web, Browser() as browser:
             service.wait_ready()
             self.open(browser, web, 1280, 900)
             for i in range(6):
                 self.see(service, i)
                 self.enter(browser, pasted(self.cell.poses[i]), notation="fanuc")
-                browser.click("#take-look")
-                browser.wait(f"/^(TAKEN|Not taken)/.test({STATE}) && !document.getElementById('take-look').disabled", "no look")
+                browser.click("#take-pose")
+                browser.wait(f"/^(TAKEN|Not taken)/.test({STATE}) && !document.getElementById('take-pose').disabled", "no view")
                 if browser.run(f"return {STATE};").startswith("Not"):
                     break
             self.assertRegex(browser.run(f"return {VERDICT};"), "choose “KUKA")
@@ -332,7 +332,7 @@ class Operator(HandEye):
 
 class Requests(HandEye):
     def test_what_does_not_belong_is_refused(self):
-        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.looks) as web:
+        with Service(configuration=self.cell.text(0)) as service, Web(service, "--hand-eye", self.views) as web:
             service.wait_ready()
             right = {"action": "take", "mounted": "arm", "poses": "kuka", "pose": robot.kuka(self.cell.poses[0])}
             for wrong in ({"action": "fly"}, {"action": 7}, {"action": "take"}, {**right, "mounted": "head"}, {**right, "poses": "../ur"},
@@ -344,7 +344,7 @@ class Requests(HandEye):
             self.assertIn("did you mean distance_mm?", web.post("/api/hand_eye/act", **right, distance=5)[2].decode())
             for look in ("", "pose_00", "../pose_00", "..", "/etc", 5, None, "pose_00/../.."):
                 self.assertEqual(name_of(web.post("/api/hand_eye/act", action="drop", look=look)), (404, "not_found"), look)
-            self.assertFalse(self.looks.exists() and any(each.name.startswith("pose") for each in self.looks.rglob("*")))
+            self.assertFalse(self.views.exists() and any(each.name.startswith("pose") for each in self.views.rglob("*")))
             for query in ("", "?look=pose_00", "?look=..", "?look=../../etc&camera=passwd", "?look=pose_00&camera=../.."):
                 self.assertEqual(name_of(web.get("/api/hand_eye/look" + query)), (404, "not_found"), query)
             self.assertEqual(name_of(web.get("/api/hand_eye/file")), (404, "not_found"))
@@ -355,16 +355,16 @@ class Requests(HandEye):
             self.assertEqual(([look["name"] for look in taken["looks"]], taken["error"]), (["pose_00"], None))
             self.assertEqual(web.ask("GET", "/api/hand_eye/look?look=pose_00", headers={})[0], 401)
             status, headers, png = web.get("/api/hand_eye/look?look=pose_00&camera=")
-            self.assertEqual((status, png), (200, (self.looks / "pose_00/white.png").read_bytes()))
+            self.assertEqual((status, png), (200, (self.views / "pose_00/white.png").read_bytes()))
             self.assertGreater(len(json.loads(headers["X-Slsd-About"])["points_px"]), 20)
             self.assertEqual(name_of(web.get("/api/hand_eye/look?look=pose_00/..&camera=pose_00")), (404, "not_found"))
 
-    def test_looks_outlive_the_page(self):
+    def test_views_outlive_the_page(self):
         with Service(configuration=self.cell.text(0)) as service:
             service.wait_ready()
-            with Web(service, "--hand-eye", self.looks) as web:
+            with Web(service, "--hand-eye", self.views) as web:
                 web.post("/api/hand_eye/act", action="take", mounted="cell", poses="kuka", pose=robot.kuka(self.cell.poses[0]))
-            with Web(service, "--hand-eye", self.looks) as web:
+            with Web(service, "--hand-eye", self.views) as web:
                 told = json.loads(web.get("/api/hand_eye")[2])
         self.assertEqual(told["choices"], {"mounted": "cell", "poses": "kuka"})
         self.assertEqual([look["name"] for look in told["looks"]], ["pose_00"])
@@ -378,17 +378,17 @@ class Requests(HandEye):
             return json.dumps({"jsonrpc": "2.0", "id": request["id"], "error": error}).encode() + b"\n"
         with Impostor(deny) as impostor:
             impostor.socket = impostor.path
-            with Web(impostor, "--hand-eye", self.looks) as web:
+            with Web(impostor, "--hand-eye", self.views) as web:
                 self.assertEqual(name_of(web.post("/api/hand_eye/act", **pose)), (403, "permission_denied"))
         service = Service(configuration=self.cell.text(0))
-        with Web(service, "--hand-eye", self.looks) as web:
+        with Web(service, "--hand-eye", self.views) as web:
             away = web.post("/api/hand_eye/act", **pose)
             self.assertEqual(name_of(away), (503, "no_service"))
             self.assertIsNone(json.loads(web.get("/api/hand_eye")[2])["error"])
             self.assertEqual(away[2], web.get("/api/presets")[2])
         with Impostor(lambda request: b"", hangs_up=True) as impostor:
             impostor.socket = impostor.path
-            with Web(impostor, "--hand-eye", self.looks) as web:
+            with Web(impostor, "--hand-eye", self.views) as web:
                 gone = web.post("/api/hand_eye/act", **pose)
                 self.assertEqual(name_of(gone), (503, "no_service"))
                 self.assertEqual(gone[2], web.get("/api/presets")[2])

@@ -76,8 +76,8 @@ class HandEye(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
         atexit.register(shutil.rmtree, cls.folder, ignore_errors=True)
-        subprocess.run([BIN / "make_looks", cls.folder, str(LOOKS)], check=True, timeout=300)
-        camera_from_board = numpy.loadtxt(cls.folder / "looks.csv", delimiter=",").reshape(-1, 4, 4)
+        subprocess.run([BIN / "make_views", cls.folder, str(LOOKS)], check=True, timeout=300)
+        camera_from_board = numpy.loadtxt(cls.folder / "views.csv", delimiter=",").reshape(-1, 4, 4)
         cls.poses = [BASE_FROM_BOARD @ numpy.linalg.inv(each) @ numpy.linalg.inv(FLANGE_FROM_RIG) for each in camera_from_board]
 
     def service_seeing(self, *looks):
@@ -229,8 +229,8 @@ class TwoCameras(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
         atexit.register(shutil.rmtree, cls.folder, ignore_errors=True)
-        subprocess.run([BIN / "make_looks", cls.folder, "8", "2"], check=True, timeout=300)
-        rig_from_board = numpy.loadtxt(cls.folder / "looks.csv", delimiter=",").reshape(-1, 4, 4)
+        subprocess.run([BIN / "make_views", cls.folder, "8", "2"], check=True, timeout=300)
+        rig_from_board = numpy.loadtxt(cls.folder / "views.csv", delimiter=",").reshape(-1, 4, 4)
         cls.poses = [BASE_FROM_BOARD @ numpy.linalg.inv(each) @ numpy.linalg.inv(FLANGE_FROM_RIG) for each in rig_from_board]
 
     def setUp(self):

@@ -162,7 +162,7 @@ std::size_t ModelSession::kept_clouds() const {
   return count;
 }
 
-json ModelSession::look() const {
+json ModelSession::state() const {
   json formats = json::object();
   for (const std::string_view format : kModelFormats) {
     std::error_code error;
@@ -208,7 +208,7 @@ tl::expected<json, Refusal> ModelSession::act(const json& body) {
     refused = invalid(R"("action" must be "start", "next", "stop", "build", "clear" or "forget_background")");
   }
   if (refused) return tl::unexpected(std::move(*refused));
-  return look();
+  return state();
 }
 
 std::optional<Refusal> ModelSession::start(const json& choices) {

@@ -38,7 +38,7 @@ class ModelSession {
 
   /// The session: its state, progress, sentences, error, and the `report` and `formats` of the finished model. In
   /// another state than "done" these are of the model before.
-  [[nodiscard]] nlohmann::json look() const;
+  [[nodiscard]] nlohmann::json state() const;
   /// Carries out what the page asks for:
   ///
   ///     start              a new model, with the optional `until_closed`, or `turntable`, its `views` and `colour`;
@@ -49,7 +49,7 @@ class ModelSession {
   ///     clear              end without a model; delete clouds and files
   ///     forget_background  delete the cloud of the empty scene
   ///
-  /// @return as look()
+  /// @return as state()
   [[nodiscard]] tl::expected<nlohmann::json, Refusal> act(const nlohmann::json& body);
   /// Keeps a dense cloud of the scene without the object.
   [[nodiscard]] std::optional<Refusal> keep_background(std::string_view ply);

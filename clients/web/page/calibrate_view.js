@@ -2,7 +2,7 @@
 // Copyright the slsd authors
 "use strict";
 
-const kLookPause = 400, kIdlePause = 2000;
+const kBusyPause = 400, kIdlePause = 2000;
 const kMany = 20;  // points in a cell of the coverage
 
 const kSessionStates = {
@@ -106,7 +106,7 @@ async function calibrate(body) {
 
 async function followCalibration() {
   let number = -1, wasUnderWay = false;
-  for (;; await pause(wasUnderWay ? kLookPause : kIdlePause)) {
+  for (;; await pause(wasUnderWay ? kBusyPause : kIdlePause)) {
     if (document.hidden || !(isShown("calibrate") || wasUnderWay) || !mayAdminister) continue;
     try {
       const told = await askState("api/calibration");

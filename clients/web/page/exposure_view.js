@@ -2,9 +2,9 @@
 // Copyright the slsd authors
 "use strict";
 
-const kLooks = 3;  // clipped symbols hide how bright they are: the first proposal may be rough
+const kProposals = 3;  // clipped symbols hide how bright they are: the first proposal may be rough
 
-const lookAtExposure = async (camera) => (await ask("api/exposure?camera=" + encodeURIComponent(camera))).json();
+const adviseExposure = async (camera) => (await ask("api/exposure?camera=" + encodeURIComponent(camera))).json();
 
 async function setCamera(camera, set) {
   const told = await (await ask("api/set", {camera: {[camera]: set}})).json();
@@ -47,7 +47,7 @@ const troublesOf = (told) => told.troubles.map((trouble) => element("p", trouble
 async function proposeExposure() {
   $("exposure").replaceChildren(element("p", "Taking two frames…"));
   try {
-    const camera = $("which-camera").value, told = await lookAtExposure(camera);
+    const camera = $("which-camera").value, told = await adviseExposure(camera);
     const lines = [element("p", lightInWords(told))];
     if (told.proposed && told.present)
       lines.push(element("p", `Set exposure_us = ${Math.round(told.proposed.exposure_us)} and a gain of ` +
@@ -67,9 +67,9 @@ async function setBestExposure() {
   const camera = $("which-camera").value;
   let before = null, set = null, problem = "", told;
   try {
-    for (let look = 0; look < kLooks; ++look) {
+    for (let i = 0; i < kProposals; ++i) {
       $("exposure").replaceChildren(element("p", "Taking two frames…"));
-      told = await lookAtExposure(camera);
+      told = await adviseExposure(camera);
       if (!told.proposed || !told.present) break;
       before = before || told.present;
       set = settingOf(told);

@@ -66,7 +66,7 @@ function forThePage(message) {
 
 // ---- a view ----
 
-async function drawLook(name) {
+async function drawPose(name) {
   const address = `api/hand_eye/look?look=${encodeURIComponent(name)}`;
   let cameras = [null];
   for (let i = 0; i < cameras.length; ++i) {
@@ -118,20 +118,20 @@ function onSecondPress(button, question, action) {
   });
 }
 
-function lookRow(look, notation) {
+function viewRow(view, notation) {
   const row = document.createElement("tr");
-  row.dataset.look = look.name;
-  const cells = [look.name, poseInWords(look.pose, notation),
-                 look.unused ? "not used: " + look.unused : look.corners === undefined ? "" : String(look.corners),
-                 look.distance_mm === undefined ? "" : look.distance_mm.toFixed(0),
-                 look.error_px === undefined ? "" : look.error_px.toFixed(3)];
+  row.dataset.pose = view.name;
+  const cells = [view.name, poseInWords(view.pose, notation),
+                 view.unused ? "not used: " + view.unused : view.corners === undefined ? "" : String(view.corners),
+                 view.distance_mm === undefined ? "" : view.distance_mm.toFixed(0),
+                 view.error_px === undefined ? "" : view.error_px.toFixed(3)];
   row.append(...cells.map((text) => element("td", text)));
-  if (look.unused) row.children[2].className = "bad";
+  if (view.unused) row.children[2].className = "bad";
   const show = element("button", "Show"), erase = element("button", "Delete"), last = document.createElement("td");
-  show.setAttribute("aria-label", `Show ${look.name}`);
-  erase.setAttribute("aria-label", `Delete ${look.name}`);
-  onClick(show, () => drawLook(look.name));
-  onSecondPress(erase, () => "Sure?", () => act({action: "drop", look: look.name}, "Calculating…"));
+  show.setAttribute("aria-label", `Show ${view.name}`);
+  erase.setAttribute("aria-label", `Delete ${view.name}`);
+  onClick(show, () => drawPose(view.name));
+  onSecondPress(erase, () => "Sure?", () => act({action: "drop", look: view.name}, "Calculating…"));
   last.append(show, erase);
   row.append(last);
   return row;
@@ -183,12 +183,12 @@ function showHandEye(told) {
   [handEye, handEyeText] = [told, text];
   if (!handEyePlaced) placeChoices(told.choices);
   handEyePlaced = true;
-  const {looks, outcome, choices} = told;
-  $("look-list").hidden = looks.length === 0;
-  $("look-list").caption.textContent = `${countOf(looks.length, "view")}; 12 or more are better`;
-  $("look-list").tBodies[0].replaceChildren(...looks.map((look) => lookRow(look, choices.poses)));
-  allow($("hand-eye-calculate"), looks.length > 0);
-  allow($("hand-eye-clear"), looks.length > 0);
+  const {looks: views, outcome, choices} = told;
+  $("hand-eye-views").hidden = views.length === 0;
+  $("hand-eye-views").caption.textContent = `${countOf(views.length, "view")}; 12 or more are better`;
+  $("hand-eye-views").tBodies[0].replaceChildren(...views.map((view) => viewRow(view, choices.poses)));
+  allow($("hand-eye-calculate"), views.length > 0);
+  allow($("hand-eye-clear"), views.length > 0);
   allow($("use-next"), Boolean(outcome && outcome.next_pose));
   $("hand-eye-verdict").replaceChildren(...verdictLines(told));
   if (told.busy) $("hand-eye-state").textContent = "A view is being taken or evaluated…";
@@ -220,22 +220,22 @@ async function act(body, words) {
   }
 }
 
-async function takeLook() {
+async function takePose() {
   const pose = understandPose();
   if (!pose) throw new Error(`Enter the robot's pose: ${kNotations[$("notation").value][0]} has ${needsOf($("notation").value)} numbers.`);
-  const before = new Set(handEye ? handEye.looks.map((look) => look.name) : []);
+  const before = new Set(handEye ? handEye.looks.map((view) => view.name) : []);
   const told = await act({action: "take", pose, ...choicesMade()}, "Taking a view. The robot must stand still…");
-  const taken = told.looks.find((look) => !before.has(look.name));
+  const taken = told.looks.find((view) => !before.has(view.name));
   $("hand-eye-state").className = taken ? "good" : "bad";
   $("hand-eye-state").textContent = taken ? `TAKEN ✓ ${taken.name}` : "Not taken";
   if (taken) $("robot-pose").value = "";
   understandPose();
-  await (taken ? drawLook(taken.name) : drawRefused());
+  await (taken ? drawPose(taken.name) : drawRefused());
 }
 
 async function followHandEye() {
   for (;; await pause(kHandEyePause)) {
-    if (document.hidden || !$("hand-eye").open || !isShown("hand-eye") || $("take-look").dataset.busy === "yes") continue;
+    if (document.hidden || !$("hand-eye").open || !isShown("hand-eye") || $("take-pose").dataset.busy === "yes") continue;
     try {
       showHandEye(await askState("api/hand_eye"));
       say("hand-eye", null);
@@ -252,9 +252,9 @@ function beginHandEye() {
   for (const id of ["mounted", "notation"]) $(id).addEventListener("change", showMounting);
   $("robot-pose").addEventListener("input", understandPose);
   $("robot-pose").addEventListener("keydown", (event) => {
-    if (event.key === "Enter") press("take-look");
+    if (event.key === "Enter") press("take-pose");
   });
-  onClick($("take-look"), takeLook);
+  onClick($("take-pose"), takePose);
   onClick($("hand-eye-calculate"), () => act({action: "calculate", ...choicesMade()}, "Calculating…"));
   onSecondPress($("hand-eye-clear"), () => `Delete ${countOf(handEye.looks.length, "view")}?`, async () => {
     await act({action: "clear"}, "");

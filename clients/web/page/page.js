@@ -172,7 +172,7 @@ function showStatus(told) {
     offerColours();
   }
   allow($("calibrate-begin"), mayAdminister);
-  allow($("take-look"), mayAdminister);
+  allow($("take-pose"), mayAdminister);
   showPresets();
   allow($("expose"), mayAdminister);
   allow($("box-for-all"), mayKeepBox());

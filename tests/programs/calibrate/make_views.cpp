@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
 
-// Draws views of a board: make_looks DIR COUNT makes DIR/pose_NN/white.png, calibration.yml with the board's name, and
-// looks.csv with the 4x4 matrix camera_from_board (mm) of each, row by row. make_looks DIR COUNT 2 makes
-// DIR/pose_NN/camera/white.png and DIR/pose_NN/right/white.png, of two cameras; then looks.csv has rig_from_board.
+// Draws views of a board: make_views DIR COUNT makes DIR/pose_NN/white.png, calibration.yml with the board's name, and
+// views.csv with the 4x4 matrix camera_from_board (mm) of each, row by row. make_views DIR COUNT 2 makes
+// DIR/pose_NN/camera/white.png and DIR/pose_NN/right/white.png, of two cameras; then views.csv has rig_from_board.
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
@@ -29,7 +29,7 @@ CalibratedCamera right_of(const CalibratedCamera& first) {
   return right;
 }
 
-void write_looks(const std::filesystem::path& folder, const Calibration& rig, const Board& board,
+void write_views(const std::filesystem::path& folder, const Calibration& rig, const Board& board,
                  const Pattern& pattern, const RigidTransform& rig_from_board) {
   for (const CalibratedCamera& camera : rig.cameras) {
     Calibration alone = rig;
@@ -58,17 +58,17 @@ int main(int argc, char** argv) {
   const auto pattern = make_pattern(options);
   const auto board = parse_board(kSimulatedBoard);
   if (!pattern || !board) return 1;
-  std::string looks;
+  std::string views;
   for (int i = 0; i < std::atoi(argv[2]); ++i) {
     const RigidTransform pose = simulated_pose(i);
-    write_looks(folder / fmt::format("pose_{:02}", i), rig, *board, *pattern, pose);
+    write_views(folder / fmt::format("pose_{:02}", i), rig, *board, *pattern, pose);
     for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) looks += fmt::format("{:.9f},", pose.rotation(row, column));
-      looks += fmt::format("{:.9f},", pose.translation[row]);
+      for (int column = 0; column < 3; ++column) views += fmt::format("{:.9f},", pose.rotation(row, column));
+      views += fmt::format("{:.9f},", pose.translation[row]);
     }
-    looks += "0,0,0,1\n";
+    views += "0,0,0,1\n";
   }
   rig.report.board = kSimulatedBoard;
   write(folder / "calibration.yml", write_calibration(rig));
-  write(folder / "looks.csv", looks);
+  write(folder / "views.csv", views);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Copyright the slsd authors
-#include "clients/web/look_folder.hpp"
+#include "clients/web/view_folder.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -20,7 +20,7 @@ constexpr std::size_t kPictureBytesMax = 128 << 20;
 constexpr std::string_view kPrefix = "pose_";
 constexpr std::string_view kDigits = "0123456789";
 
-bool is_look_name(std::string_view name) {
+bool is_view_name(std::string_view name) {
   return name.starts_with(kPrefix) && name.size() > kPrefix.size() && name.size() < 20 &&
          name.substr(kPrefix.size()).find_first_not_of(kDigits) == std::string_view::npos;
 }
@@ -36,36 +36,36 @@ std::vector<std::string> lines_of_poses(const fs::path& folder) {
   return lines;
 }
 
-std::optional<KeptLook> look_of_line(std::string_view line) {
-  KeptLook look{std::string(line.substr(0, line.find(','))), {}};
-  if (!is_look_name(look.name)) return std::nullopt;
-  for (std::size_t at = look.name.size(); at < line.size();) {
+std::optional<KeptView> view_of_line(std::string_view line) {
+  KeptView view{std::string(line.substr(0, line.find(','))), {}};
+  if (!is_view_name(view.name)) return std::nullopt;
+  for (std::size_t at = view.name.size(); at < line.size();) {
     const std::size_t begin = at + 1, end = std::min(line.find(',', begin), line.size());
     double number = 0;
     const auto [stop, wrong] = std::from_chars(line.data() + begin, line.data() + end, number);
     if (wrong != std::errc() || stop != line.data() + end) return std::nullopt;
-    look.pose.push_back(number);
+    view.pose.push_back(number);
     at = end;
   }
-  return look;
+  return view;
 }
 
 bool is_kept(const fs::path& folder, std::string_view name) {
-  const auto looks = looks_in(folder);
-  return std::ranges::find(looks, name, &KeptLook::name) != looks.end();
+  const auto views = views_in(folder);
+  return std::ranges::find(views, name, &KeptView::name) != views.end();
 }
 
 }  // namespace
 
-std::vector<KeptLook> looks_in(const fs::path& folder) {
-  std::vector<KeptLook> looks;
+std::vector<KeptView> views_in(const fs::path& folder) {
+  std::vector<KeptView> views;
   for (const std::string& line : lines_of_poses(folder)) {
-    if (auto look = look_of_line(line)) looks.push_back(std::move(*look));
+    if (auto view = view_of_line(line)) views.push_back(std::move(*view));
   }
-  return looks;
+  return views;
 }
 
-Result<> erase_look(const fs::path& folder, std::string_view name) {
+Result<> erase_view(const fs::path& folder, std::string_view name) {
   if (!is_kept(folder, name))
     return fail(ErrorCode::kNotFound, "there is no such view: choose one from the list", std::string(name));
   std::string text;
@@ -76,12 +76,12 @@ Result<> erase_look(const fs::path& folder, std::string_view name) {
   if (auto written = write_file_atomically(folder / "poses.csv", text); !written) return written;
   std::error_code error;
   fs::remove_all(folder / name, error);
-  if (!error && looks_in(folder).empty()) fs::remove(folder / "poses.csv", error);
+  if (!error && views_in(folder).empty()) fs::remove(folder / "poses.csv", error);
   if (error) return fail(ErrorCode::kIo, error.message(), folder.string());
   return {};
 }
 
-std::vector<std::string> cameras_of_look(const fs::path& folder, std::string_view name) {
+std::vector<std::string> cameras_of_view(const fs::path& folder, std::string_view name) {
   std::error_code error;
   if (fs::exists(folder / name / "white.png", error)) return {""};
   std::vector<std::string> cameras;
@@ -93,9 +93,9 @@ std::vector<std::string> cameras_of_look(const fs::path& folder, std::string_vie
   return cameras;
 }
 
-Result<std::string> picture_of_look(const fs::path& folder, std::string_view name, std::string_view camera) {
+Result<std::string> picture_of_view(const fs::path& folder, std::string_view name, std::string_view camera) {
   if (is_kept(folder, name)) {
-    for (const std::string& each : cameras_of_look(folder, name)) {
+    for (const std::string& each : cameras_of_view(folder, name)) {
       if (each == camera || each.empty()) return read_file(folder / name / each / "white.png", kPictureBytesMax);
     }
   }
