@@ -119,6 +119,12 @@ class Install(unittest.TestCase):
         self.assertIn("usr/share/doc/slsd", packaged)
         self.assertRegex((SOURCE / "debian/rules").read_text(encoding="utf-8"), r"dh_compress -X\.md")
 
+    def test_descriptions_of_packages_are_as_wide_as_lintian_allows(self):
+        """./run package refuses wider ones, but only after it has built everything."""
+        for line in (SOURCE / "debian/control").read_text(encoding="utf-8").splitlines():
+            if line.startswith(" "):
+                self.assertLessEqual(len(line), 80, line)
+
     def unit(self, name, prefix="usr"):
         return (self.root / prefix / "lib/systemd/system" / name).read_text(encoding="utf-8")
 
