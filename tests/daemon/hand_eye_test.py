@@ -14,7 +14,7 @@ import numpy
 
 from service import BIN, SCENE, Service, slsctl
 
-LOOKS = 10
+VIEWS = 10
 CONFIGURATION = """
 [projector]
 width_px = 640
@@ -76,20 +76,20 @@ class HandEye(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="slsd-test-"))
         atexit.register(shutil.rmtree, cls.folder, ignore_errors=True)
-        subprocess.run([BIN / "make_views", cls.folder, str(LOOKS)], check=True, timeout=300)
+        subprocess.run([BIN / "make_views", cls.folder, str(VIEWS)], check=True, timeout=300)
         camera_from_board = numpy.loadtxt(cls.folder / "views.csv", delimiter=",").reshape(-1, 4, 4)
         cls.poses = [BASE_FROM_BOARD @ numpy.linalg.inv(each) @ numpy.linalg.inv(FLANGE_FROM_RIG) for each in camera_from_board]
 
-    def service_seeing(self, *looks):
+    def service_seeing(self, *views):
         """A service whose camera sees these views, one after the other; None: no board."""
         service = Service(configuration=CONFIGURATION.format(folder=self.folder))
         frames = service.folder / "frames"
         frames.mkdir()
-        for i, look in enumerate(looks):
-            if look is None:
+        for i, view in enumerate(views):
+            if view is None:
                 (frames / f"{i:02}.pgm").write_bytes(b"P5 800 600 255\n" + bytes(800 * 600))
             else:
-                shutil.copy(self.folder / f"pose_{look:02}/white.png", frames / f"{i:02}.png")
+                shutil.copy(self.folder / f"pose_{view:02}/white.png", frames / f"{i:02}.png")
         self.captures = service.folder / "captures"
         return service
 
@@ -107,12 +107,12 @@ class HandEye(unittest.TestCase):
         self.assertRegex(done.stderr, reason)
         self.assertEqual(self.files(), self.before)
 
-    def test_from_the_first_look_to_the_file(self):
-        with self.service_seeing(*range(LOOKS)) as service:
+    def test_from_the_first_view_to_the_file(self):
+        with self.service_seeing(*range(VIEWS)) as service:
             self.assertIn("2 poses are too few", [self.hand_eye(service, kuka(pose)) for pose in self.poses[:2]][1].stdout)
             self.assertFalse((self.captures / "hand_eye.yml").exists())
             errors = []
-            for i in range(2, LOOKS):
+            for i in range(2, VIEWS):
                 done = self.hand_eye(service, kuka(self.poses[i]), options=["--json"])
                 self.assertEqual(done.returncode, 0, done.stderr)
                 told = json.loads(done.stdout)
@@ -127,7 +127,7 @@ class HandEye(unittest.TestCase):
         rotation = matrix_of(file, "flange_from_rig_R").reshape(3, 3).T @ FLANGE_FROM_RIG[:3, :3]
         self.assertLess(numpy.linalg.norm(place), 1.5)
         self.assertLess(angle_of(rotation), 1e-3)
-        self.assertEqual((self.captures / "poses.csv").read_text(encoding="utf-8").count("\n"), LOOKS)
+        self.assertEqual((self.captures / "poses.csv").read_text(encoding="utf-8").count("\n"), VIEWS)
 
     def check_next(self, base_from_flange):
         """Of the proposed pose, the board is in the middle of the picture, near the working distance."""
@@ -161,23 +161,23 @@ class HandEye(unittest.TestCase):
             self.assertIn("too few", json.loads(early.stdout.splitlines()[-1])["missing"])
             for pose in self.poses[1:5]:
                 last = self.hand_eye(service, kuka(pose), options=["--json"])
-            *looks, told = map(json.loads, slsctl("--json", *words, "--looks").stdout.splitlines())
+            *views, told = map(json.loads, slsctl("--json", *words, "--looks").stdout.splitlines())
             self.assertEqual(told, json.loads(last.stdout))
-            self.assertEqual([look["look"] for look in looks], [f"pose_{i:02}" for i in range(5)])
-            for i, look in enumerate(looks):
-                self.check_points(look, numpy.linalg.inv(self.poses[i] @ FLANGE_FROM_RIG) @ BASE_FROM_BOARD)
+            self.assertEqual([view["look"] for view in views], [f"pose_{i:02}" for i in range(5)])
+            for i, view in enumerate(views):
+                self.check_points(view, numpy.linalg.inv(self.poses[i] @ FLANGE_FROM_RIG) @ BASE_FROM_BOARD)
             self.assertEqual(slsctl("--json", *words).stdout, last.stdout)
             (self.captures / "pose_02/white.png").write_bytes((self.captures / "pose_02/white.png").read_bytes()[:100])
             self.assertEqual(slsctl(*words).returncode, 1)
 
-    def check_points(self, look, rig_from_board):
+    def check_points(self, view, rig_from_board):
         """As many as it says, and no further apart than the board is wide."""
-        points = numpy.array(look["cameras"][0]["points_px"])
-        self.assertEqual((len(look["cameras"]), len(points)), (1, look["corners"]))
+        points = numpy.array(view["cameras"][0]["points_px"])
+        self.assertEqual((len(view["cameras"]), len(points)), (1, view["corners"]))
         self.assertTrue((points.min() > -0.5) and (points.max(axis=0) < (799.5, 599.5)).all())
-        self.assertLess(look["error_px"], 0.2)
+        self.assertLess(view["error_px"], 0.2)
         middle = (rig_from_board @ (210, 150, 0, 1))[:3]
-        self.assertLess(abs(look["distance_mm"] - numpy.linalg.norm(middle)), 60)
+        self.assertLess(abs(view["distance_mm"] - numpy.linalg.norm(middle)), 60)
 
     def test_poses_of_another_arm_are_named(self):
         random = numpy.random.default_rng(4)
@@ -237,16 +237,16 @@ class TwoCameras(unittest.TestCase):
         self.service = Service(configuration=TWO_CAMERAS.format(folder=self.folder))
         self.captures = self.service.folder / "captures"
 
-    def copy(self, look, camera, to):
-        shutil.copy(self.folder / f"pose_{look:02}" / camera / "white.png", to)
+    def copy(self, view, camera, to):
+        shutil.copy(self.folder / f"pose_{view:02}" / camera / "white.png", to)
 
-    def kept_captures(self, *looks):
+    def kept_captures(self, *views):
         """Those views, as the robot's program saves them."""
-        for look in looks:
+        for view in views:
             for camera in ("camera", "right"):
-                (self.captures / f"pose_{look:02}" / camera).mkdir(parents=True)
-                self.copy(look, camera, self.captures / f"pose_{look:02}" / camera / "white.png")
-        lines = [f"pose_{look:02}," + ",".join(f"{number:.6f}" for number in kuka(self.poses[look])) for look in looks]
+                (self.captures / f"pose_{view:02}" / camera).mkdir(parents=True)
+                self.copy(view, camera, self.captures / f"pose_{view:02}" / camera / "white.png")
+        lines = [f"pose_{view:02}," + ",".join(f"{number:.6f}" for number in kuka(self.poses[view])) for view in views]
         (self.captures / "poses.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     def from_files(self, *options):
@@ -262,27 +262,27 @@ class TwoCameras(unittest.TestCase):
         self.assertLess(numpy.linalg.norm(place), 1.5)
         self.assertLess(angle_of(rotation), 1e-3)
 
-    def test_both_pictures_of_each_look_count(self):
+    def test_both_pictures_of_each_view_count(self):
         self.kept_captures(*range(8))
         done, told = self.from_files()
         self.assertEqual(done.returncode, 0, done.stderr)
-        for look in told[:-1]:
-            self.assertEqual([each["name"] for each in look["cameras"]], ["camera", "right"])
-            points = [len(each["points_px"]) for each in look["cameras"]]
+        for view in told[:-1]:
+            self.assertEqual([each["name"] for each in view["cameras"]], ["camera", "right"])
+            points = [len(each["points_px"]) for each in view["cameras"]]
             self.assertGreater(min(points), 15)
-            self.assertEqual(sum(points), look["corners"])
-            self.assertLess(look["error_px"], 0.2)
+            self.assertEqual(sum(points), view["corners"])
+            self.assertLess(view["error_px"], 0.2)
         self.assertEqual(told[-1]["poses"], 8)
         self.check_place()
 
     def test_either_camera_alone_may_see_the_board(self):
         self.kept_captures(*range(8))
-        for look, camera in ((1, "camera"), (2, "right"), (5, "camera"), (6, "camera"), (6, "right")):
-            (self.captures / f"pose_{look:02}" / camera / "white.png").unlink()
-            (self.captures / f"pose_{look:02}" / camera / "white.pgm").write_bytes(NOTHING)
+        for view, camera in ((1, "camera"), (2, "right"), (5, "camera"), (6, "camera"), (6, "right")):
+            (self.captures / f"pose_{view:02}" / camera / "white.png").unlink()
+            (self.captures / f"pose_{view:02}" / camera / "white.pgm").write_bytes(NOTHING)
         done, told = self.from_files()
         self.assertEqual(done.returncode, 0, done.stderr)
-        seen = [[each["name"] for each in look.get("cameras", [])] for look in told[:-1]]
+        seen = [[each["name"] for each in view.get("cameras", [])] for view in told[:-1]]
         self.assertEqual(seen[1:3] + seen[5:7], [["right"], ["camera"], ["right"], []])
         self.assertRegex(told[6]["unused"], ".+; .+")  # a reason of each camera
         self.assertEqual(told[-1]["poses"], 7)
@@ -295,11 +295,11 @@ class TwoCameras(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("left: the calibration has no camera of this name", done.stdout + done.stderr)
 
-    def test_look_by_look_with_the_service(self):
+    def test_view_by_view_with_the_service(self):
         for camera, folder in (("camera", "left"), ("right", "right")):
             (self.service.folder / folder).mkdir()
-            for look in range(8):
-                self.copy(look, camera, self.service.folder / folder / f"{look:02}.png")
+            for view in range(8):
+                self.copy(view, camera, self.service.folder / folder / f"{view:02}.png")
         (self.service.folder / "right/03.png").unlink()
         (self.service.folder / "right/03.pgm").write_bytes(NOTHING)
         with self.service as service:

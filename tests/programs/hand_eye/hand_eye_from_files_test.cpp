@@ -24,7 +24,7 @@ using std::filesystem::path;
 using testing::HasSubstr;
 using testing::Not;
 
-constexpr int kLooks = 8;
+constexpr int kViews = 8;
 
 path temporary_folder() {
   std::string name = testing::TempDir() + "slsd-hand-eye-XXXXXX";
@@ -44,7 +44,7 @@ class HandEyeFromFiles : public testing::Test {
     std::ofstream(home_ / "calibration.yml") << write_calibration(calibration);
     std::ofstream(home_ / "slsd.toml") << "[projector]\nwidth_px = 640\nheight_px = 400\n"
                                           "[calibration]\nfile = \"calibration.yml\"\n";
-    for (int i = 0; i < kLooks; ++i) {
+    for (int i = 0; i < kViews; ++i) {
       write_simulated_pose(home_ / fmt::format("captures/pose_{:02}", i), small_rig(), *parse_board(kSimulatedBoard),
                            *make_pattern(options), simulated_pose(i));
     }
@@ -69,7 +69,7 @@ class HandEyeFromFiles : public testing::Test {
         Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, 0.3, -0.2).normalized()).toRotationMatrix(), {900, 200, 50}};
     std::ofstream file(home_ / "captures/poses.csv");
     file << "# written by the test\n";
-    for (int i = 0; i < kLooks; ++i) {
+    for (int i = 0; i < kViews; ++i) {
       const RigidTransform base_from_flange =
           base_from_board.after(simulated_pose(i).inverse()).after(flange_from_rig().inverse());
       file << fmt::format("pose_{:02}", i);
