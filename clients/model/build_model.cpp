@@ -157,7 +157,7 @@ Result<Model> ModelBuilder::finish(const Read& read, const Tell& tell, const Adv
     auto images = read_images(*ply);
     if (!images) return tl::unexpected(images.error());
     drop_foreign(*images, frames[i].shot);
-    volume.add(make_shot(std::move(*images)), frames[i].object_from_rig);
+    volume.add(make_shot_to_fuse(std::move(*images)), frames[i].object_from_rig);
     report.fused.push_back({name, frames[i].object_from_rig, *fit});
   }
   if (advance) advance(frames.size(), frames.size());

@@ -31,6 +31,19 @@ std::vector<Rgb> colours_of(const RangeImage& image, const CellGrid& grid) {
   return colours;
 }
 
+Shot make_shot(std::vector<RangeImage> images, bool has_edges) {
+  Shot shot;
+  for (RangeImage& image : images) {
+    SurfaceView view;
+    view.levels = fit_cells(image);
+    if (has_edges) view.edges = surface_edges(image, view.levels.back());
+    view.colours = colours_of(image, view.levels.back());
+    view.image = std::move(image);
+    shot.views.push_back(std::move(view));
+  }
+  return shot;
+}
+
 }  // namespace
 
 std::size_t Shot::cells() const {
@@ -50,16 +63,11 @@ Eigen::Vector3d Shot::middle_mm() const {
 }
 
 Shot make_shot(std::vector<RangeImage> images) {
-  Shot shot;
-  for (RangeImage& image : images) {
-    SurfaceView view;
-    view.levels = fit_cells(image);
-    view.edges = surface_edges(image, view.levels.back());
-    view.colours = colours_of(image, view.levels.back());
-    view.image = std::move(image);
-    shot.views.push_back(std::move(view));
-  }
-  return shot;
+  return make_shot(std::move(images), true);
+}
+
+Shot make_shot_to_fuse(std::vector<RangeImage> images) {
+  return make_shot(std::move(images), false);
 }
 
 }  // namespace slsd::model

@@ -33,4 +33,7 @@ struct Shot {
 /// @thread reentrant
 [[nodiscard]] Shot make_shot(std::vector<RangeImage> images);
 
+/// A shot without edges: not to be aligned, but to be fused. @thread reentrant
+[[nodiscard]] Shot make_shot_to_fuse(std::vector<RangeImage> images);
+
 }  // namespace slsd::model

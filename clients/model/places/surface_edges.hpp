@@ -27,10 +27,11 @@ struct EdgeGrid {
   static constexpr std::int32_t kNone = -1;
 
   std::vector<SurfaceEdge> edges;
-  std::vector<std::int32_t> of_cell;  ///< index of its edge, or kNone
+  std::vector<std::int32_t> of_cell;  ///< index of its edge, or kNone; empty: edges were not looked for
 
   [[nodiscard]] const SurfaceEdge* of(std::size_t cell) const {
-    return of_cell[cell] == kNone ? nullptr : &edges[static_cast<std::size_t>(of_cell[cell])];
+    if (edges.empty() || of_cell[cell] == kNone) return nullptr;
+    return &edges[static_cast<std::size_t>(of_cell[cell])];
   }
 };
 

@@ -52,6 +52,14 @@ TEST(SurfaceEdges, HaveTheWidthOfAPixelOnAnObliqueSurface) {
   EXPECT_GT(upright, 10);
 }
 
+TEST(SurfaceEdges, AreNotLookedForInAShotToFuse) {
+  const Shot shot =
+      make_shot_to_fuse(*range_images(measure_eroded(plate, rig_from_object(0), kSigmaMm, 1), test_calibration(), {}));
+  EXPECT_THAT(edges_of(shot), testing::IsEmpty());
+  EXPECT_EQ(shot.views[0].edges.of(0), nullptr);
+  EXPECT_EQ(shot.cells(), eroded_shot_of(plate, rig_from_object(0), kSigmaMm, 1).cells());
+}
+
 TEST(SurfaceEdges, AreNotWhereARoundSurfaceBendsAway) {
   EXPECT_THAT(edges_of(eroded_shot_of(smooth_ball, rig_from_object(0), kSigmaMm, 1)), testing::IsEmpty());
   for (const float radius_mm : {5.0F, 8.0F, 15.0F, 25.0F, 40.0F}) {
