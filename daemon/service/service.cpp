@@ -75,8 +75,6 @@ void note_exposures(nlohmann::json& given, const nlohmann::json& next) {
 
 Result<std::unique_ptr<Service>> Service::create(Configuration configuration, const std::filesystem::path& file,
                                                  nlohmann::json settings) {
-  // A second service must not show its picture over that of the first, nor take its cameras.
-  if (auto can = check_can_listen(configuration.server.socket); !can) return tl::unexpected(can.error());
   auto projector = make_projector(configuration.projector);
   if (!projector) return tl::unexpected(projector.error());
   std::vector<std::unique_ptr<Camera>> cameras;
@@ -97,6 +95,8 @@ Result<std::unique_ptr<Service>> Service::create(Configuration configuration, co
   for (const std::string& doubt : setup->doubts) spdlog::warn("{}", doubt);
   if (configuration.decode.density == Density::kPixels && setup->calibration)
     for (const std::string& warning : calibration_error_warnings(*setup->calibration)) spdlog::warn("{}", warning);
+  // The rig opens the devices. A second service must not show its picture over that of the first, nor take its cameras.
+  if (auto can = check_can_listen(configuration.server.socket); !can) return tl::unexpected(can.error());
   auto rig = std::make_unique<Rig>(std::move(*projector), std::move(cameras), setup->image, configuration.scan,
                                    exposures_us, texture_cameras);
   rig->set_idle(draw_idle(configuration.projector), std::chrono::milliseconds(configuration.projector.idle_after_ms));
