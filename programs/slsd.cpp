@@ -158,6 +158,6 @@ int main(int argc, char** argv) {
   if (line->calibrates()) return slsd::exit_status(slsd::start_calibrating(argv));
   slsd::start_logging(spdlog::level::from_str(line->level));
   const int status = carry_out(*line);
-  slsd::flush_log(slsd::kLogTimeout);
+  slsd::flush_log(status == EXIT_SUCCESS ? slsd::kLogTimeout : slsd::kFailureLogTimeout);
   return status;
 }

@@ -19,6 +19,8 @@ namespace slsd {
 inline constexpr std::size_t kLogLineBytesMax = 2048;
 /// The longest wait for the log's reader at the end of the program.
 inline constexpr std::chrono::milliseconds kLogTimeout{300};
+/// The same after a failure: the last line gives its reason, and a busy machine may need a while to write it.
+inline constexpr std::chrono::milliseconds kFailureLogTimeout{5000};
 /// The greatest number of lines that wait for the log's reader. Later lines are dropped and counted, until half of them
 /// are read.
 inline constexpr std::size_t kLogLinesMax = 1024;
