@@ -41,7 +41,8 @@ std::string address_of(const PageOptions& options, int port) {
 /// Tells the user what to open. Does not print a chosen token: its author knows it.
 /// @return the address with this run's token
 std::string announce(const PageOptions& options, const Token& token, int port) {
-  const std::string query = token.chosen ? "" : "?token=" + token.text, address = address_of(options, port) + query;
+  const std::string query = token.chosen ? "" : "?token=" + token.text;
+  std::string address = address_of(options, port) + query;
   std::cout << "slsd-web: open " << address
             << (token.chosen ? " and enter the token of " + options.token_file.string() : "") << "\n";
   if (!token.chosen && !options.names.empty())
