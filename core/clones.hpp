@@ -66,7 +66,8 @@ struct Cloned<kBody> {
 #endif
 };
 
-/// A loop whose results are the same on every processor, to the last bit: no clone fuses products.
+/// A loop whose results are the same on all processors of an architecture, to the last bit: on x86, no clone fuses
+/// products.
 /// @param kWide, kNarrow  the loop in vectors of eight, for processors with AVX2, and in vectors of four
 template <auto kWide, auto kNarrow>
 struct ClonedExactly;

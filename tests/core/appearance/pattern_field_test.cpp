@@ -57,7 +57,7 @@ TEST(PatternFields, FindsTheNearestBlur) {
   EXPECT_EQ(&fields.nearest(0.9F), &fields.rung(3)) << "made once";
 }
 
-TEST(PatternField, IsTheSameOnEveryProcessor) {
+TEST(PatternField, IsTheSameInEveryClone) {
   const Grey8 pattern = blocks();
   const Clone usual = clone_in_use.exchange(Clone::kPlain);
   const PatternField plain(pattern.view(), 0.6F);
