@@ -227,6 +227,8 @@ class Ending(unittest.TestCase):
             for end in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT):
                 reader = subprocess.Popen([sys.executable, "-c", program, service.socket], stdout=subprocess.PIPE,
                                           stderr=subprocess.DEVNULL,
+                                          # Shells let what runs in the background ignore it.
+                                          preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
                                           env={**os.environ, "PYTHONPATH": str(HERE.parents[1] / "clients/python")})
                 reader.stdout.readline()
                 reader.send_signal(end)
