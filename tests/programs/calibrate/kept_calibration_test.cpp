@@ -14,7 +14,7 @@ using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
-/// What stays or comes into force after a calibration from files.
+/// The calibration and the report that are in force after a calibration from files.
 class KeptCalibration : public FromFiles {};
 
 TEST_F(KeptCalibration, KeepsTheCalibrationBeforeBesideIt) {
